@@ -1,0 +1,172 @@
+"""Demonstrations on disk: `shard_00000.npz` ..., and a manifest of their checksums.
+
+A shard appears whole or not at all (written beside, then renamed) and its bytes depend
+on its arrays only, so a collection that was killed and resumed equals one that was not.
+"""
+
+import hashlib
+import io
+import json
+import os
+import zipfile
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from jaxplan.data.schema import DataError, Shard, check_shard, concatenate
+
+MANIFEST = "manifest.json"
+
+
+def shard_path(directory: str | os.PathLike, index: int) -> Path:
+    """`directory/shard_00012.npz` for index 12."""
+    return Path(directory) / f"shard_{index:05d}.npz"
+
+
+def write_shard(path: str | os.PathLike, shard: Shard) -> None:
+    """Writes a checked shard; the same arrays give the same bytes."""
+    check_shard(shard)
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w") as archive:
+        for name, column in shard._asdict().items():
+            member = io.BytesIO()
+            np.lib.format.write_array(member, column, allow_pickle=False)
+            # A bare ZipInfo has a fixed date, so the bytes depend on the arrays only.
+            archive.writestr(
+                zipfile.ZipInfo(f"{name}.npy"),
+                member.getbuffer(),
+                compress_type=zipfile.ZIP_DEFLATED,
+                compresslevel=1,
+            )
+    write_atomic(path, buffer.getvalue())
+
+
+def read_shard(path: str | os.PathLike) -> Shard:
+    """Reads and checks a shard.
+
+    Raises:
+        DataError: The file is missing, truncated, altered, or not a shard.
+    """
+    try:
+        with np.load(path, allow_pickle=False) as archive:
+            shard = Shard(**{name: archive[name] for name in archive.files})
+        return check_shard(shard)
+    except FileNotFoundError:
+        raise DataError(f"missing shard: {path}") from None
+    except Exception as error:  # a broken archive raises nearly anything
+        reason = (str(error) or type(error).__name__).splitlines()[0]
+        raise DataError(f"damaged shard: {path} ({reason})") from None
+
+
+def read_demonstrations(directory: str | os.PathLike) -> Shard:
+    """All shards of a finished collection, verified against its manifest.
+
+    Raises:
+        DataError: No such directory, no manifest, or a shard is missing or damaged.
+    """
+    names = verify(directory)["shards"]
+    return concatenate([read_shard(Path(directory) / name) for name in names])
+
+
+def write_manifest(directory: str | os.PathLike, settings: Mapping) -> dict:
+    """Records the generating settings and the SHA-256 of every shard that is there.
+
+    Call it once before collecting (it fixes the settings) and once after.
+    """
+    shards = sorted(Path(directory).glob("shard_*.npz"))
+    manifest = {
+        "settings": json.loads(json.dumps(dict(settings))),
+        "shards": {path.name: sha256(path) for path in shards},
+    }
+    text = json.dumps(manifest, indent=2, sort_keys=True) + "\n"
+    write_atomic(Path(directory) / MANIFEST, text.encode())
+    return manifest
+
+
+def read_manifest(directory: str | os.PathLike) -> dict:
+    """The manifest of `directory`, or DataError."""
+    directory = Path(directory)
+    if not directory.is_dir():
+        raise DataError(f"no such data directory: {directory}")
+    try:
+        manifest = json.loads((directory / MANIFEST).read_text())
+        if not isinstance(manifest["shards"], dict) or "settings" not in manifest:
+            raise KeyError("shards")
+        return manifest
+    except FileNotFoundError:
+        raise DataError(f"no {MANIFEST} in {directory}: unfinished?") from None
+    except (ValueError, KeyError, TypeError):
+        raise DataError(f"damaged manifest: {directory / MANIFEST}") from None
+
+
+def verify(directory: str | os.PathLike) -> dict:
+    """Checks every shard's SHA-256 against the manifest, which it returns.
+
+    Raises:
+        DataError: Names the first shard that is missing or differs; or none is listed.
+    """
+    manifest = read_manifest(directory)
+    if not manifest["shards"]:
+        raise DataError(
+            f"no shards listed in {Path(directory) / MANIFEST}: unfinished?"
+        )
+    for name, digest in manifest["shards"].items():
+        path = Path(directory) / name
+        if not path.is_file():
+            raise DataError(f"missing shard: {path}")
+        if sha256(path) != digest:
+            raise DataError(f"damaged shard: {path} (checksum differs from {MANIFEST})")
+    return manifest
+
+
+def missing_shards(
+    directory: str | os.PathLike, count: int, settings: Mapping
+) -> list[int]:
+    """Which of shards 0..count-1 are still to be made (absent, or damaged).
+
+    Raises:
+        DataError: The directory was begun with other settings.
+    """
+    directory = Path(directory)
+    listed: dict = {}
+    if (directory / MANIFEST).exists():
+        manifest = read_manifest(directory)
+        listed = manifest["shards"]
+        wanted = json.loads(json.dumps(dict(settings)))
+        if manifest["settings"] != wanted:
+            raise DataError(
+                f"{directory} was made with settings {manifest['settings']}, "
+                f"not {wanted}: choose another directory"
+            )
+    return [i for i in range(count) if not _intact(shard_path(directory, i), listed)]
+
+
+def sha256(path: str | os.PathLike) -> str:
+    """Hex SHA-256 of a file."""
+    with open(path, "rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def write_atomic(path: str | os.PathLike, content: bytes) -> None:
+    """Writes a file that a kill leaves either whole or as it was before."""
+    path = Path(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    beside = path.with_name(f".{path.name}.{os.getpid()}")
+    with open(beside, "wb") as file:
+        file.write(content)
+        file.flush()
+        os.fsync(file.fileno())
+    os.replace(beside, path)
+
+
+def _intact(path: Path, listed: Mapping[str, str]) -> bool:
+    if not path.is_file():
+        return False
+    if path.name in listed:
+        return sha256(path) == listed[path.name]
+    try:
+        read_shard(path)
+    except DataError:
+        return False
+    return True
