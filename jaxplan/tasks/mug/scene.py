@@ -1,0 +1,123 @@
+"""The mug scene: Panda, table, mug, target box, cameras; one MJCF for physics and one for planning."""
+
+from importlib import resources
+from typing import Literal
+
+import mujoco
+import numpy as np
+
+from jaxplan.tasks.mug.mug import STIFF_CONTACT, MugShape, add_mug
+
+Q_HOME = np.array([0.0, -0.35, 0.0, -2.2, 0.0, 1.85, 0.785])
+"""Where every episode starts: gripper down, the wrist camera over the whole range of mugs [rad]."""
+
+BOX_POSITION = np.array([0.45, -0.36, 0.0])
+BOX_INNER, BOX_WALL, BOX_HEIGHT, BOX_FLOOR = 0.08, 0.005, 0.04, 0.004
+"""Half of the inner side, half of the wall's thickness, height and floor thickness [m]."""
+
+IMAGE_HEIGHT, IMAGE_WIDTH = 88, 136
+
+
+def build(kind: Literal["physics", "planning"] = "physics", shape: MugShape = MugShape()) -> mujoco.MjModel:
+    """Compiles the scene; `kind` says whose geoms collide (DESIGN: two sets of geoms)."""
+    return spec(kind, shape).compile()
+
+
+def spec(kind: Literal["physics", "planning"] = "physics", shape: MugShape = MugShape()) -> mujoco.MjSpec:
+    """The scene before compilation."""
+    panda = resources.files("jaxplan.scene") / "panda.xml"
+    scene = mujoco.MjSpec.from_string(panda.read_text())
+    scene.modelname = f"mug_{kind}"
+    option = scene.option
+    option.timestep = 0.002
+    option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
+    option.impratio = 20
+    option.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
+    _add_look(scene)
+    _add_table(scene)
+    _add_box(scene)
+    add_mug(scene, shape)
+    _add_cameras(scene)
+    scene.add_key(name="home", qpos=[*Q_HOME, 0.04, 0.04, 0.5, 0, shape.height / 2, 1, 0, 0, 0],
+                  ctrl=[*Q_HOME, 0.04, 0.04])  # fmt: skip
+    for geom in list(scene.geoms):
+        if kind == "planning" and geom.group == 3 and geom.parent.name == "mug":
+            # The mug's boxes serve both: against the robot they are exact where a finger enters.
+            geom.group, geom.contype, geom.conaffinity = 4, 16, 0
+        elif geom.group == (4 if kind == "physics" else 3):
+            scene.delete(geom)
+    return scene
+
+
+def _add_look(scene: mujoco.MjSpec) -> None:
+    """Light, materials, and the two settings that make software rendering 50 times faster."""
+    scene.visual.quality.shadowsize = 1024
+    scene.visual.quality.offsamples = 0
+    scene.visual.global_.offwidth, scene.visual.global_.offheight = 1280, 960
+    scene.visual.headlight.ambient = [0.35, 0.35, 0.35]
+    scene.visual.headlight.diffuse = [0.35, 0.35, 0.35]
+    scene.visual.headlight.specular = [0.1, 0.1, 0.1]
+    scene.add_material(name="mug", rgba=[0.16, 0.38, 0.72, 1], specular=0.5, shininess=0.6)
+    scene.add_material(name="table", rgba=[0.76, 0.67, 0.54, 1], specular=0.1)
+    scene.add_material(name="box", rgba=[0.30, 0.55, 0.34, 1], specular=0.1)
+    scene.add_texture(name="sky", type=mujoco.mjtTexture.mjTEXTURE_SKYBOX, builtin=mujoco.mjtBuiltin.mjBUILTIN_GRADIENT,
+                      rgb1=[0.92, 0.94, 0.96], rgb2=[0.62, 0.68, 0.74], width=64, height=384)  # fmt: skip
+    scene.worldbody.add_light(pos=[0.6, -0.8, 1.8], dir=[-0.2, 0.8, -1.6], diffuse=[0.5, 0.5, 0.5], castshadow=True)
+
+
+def _add_table(scene: mujoco.MjSpec) -> None:
+    for group in (3, 4):
+        scene.worldbody.add_geom(
+            name="table" if group == 3 else "table_planning", type=mujoco.mjtGeom.mjGEOM_PLANE,
+            size=[0, 0, 0.1], group=group, contype=1 if group == 3 else 4, conaffinity=3 if group == 3 else 12,
+            **STIFF_CONTACT,
+        )  # fmt: skip
+    scene.worldbody.add_geom(
+        name="table_visual", type=mujoco.mjtGeom.mjGEOM_BOX, size=[0.55, 0.75, 0.02], pos=[0.35, 0, -0.0205],
+        contype=0, conaffinity=0, group=2, material="table",
+    )  # fmt: skip
+
+
+def _add_box(scene: mujoco.MjSpec) -> None:
+    body = scene.worldbody.add_body(name="box", pos=BOX_POSITION)
+    outer, middle = BOX_INNER + 2 * BOX_WALL, BOX_INNER + BOX_WALL
+    parts = {"floor": ([0, 0, BOX_FLOOR / 2], [outer, outer, BOX_FLOOR / 2])}
+    z, h = BOX_FLOOR + BOX_HEIGHT / 2, BOX_HEIGHT / 2
+    for name, x, y in (("front", 1, 0), ("back", -1, 0), ("left", 0, 1), ("right", 0, -1)):
+        size = [BOX_WALL, outer, h] if x else [BOX_INNER, BOX_WALL, h]
+        parts[name] = ([x * middle, y * middle, z], size)
+    for name, (pos, size) in parts.items():
+        body.add_geom(
+            name=f"box_{name}", type=mujoco.mjtGeom.mjGEOM_BOX, pos=pos, size=size, group=3, contype=1,
+            conaffinity=3, material="box", **STIFF_CONTACT,
+        )  # fmt: skip
+        body.add_geom(
+            name=f"box_{name}_planning", type=mujoco.mjtGeom.mjGEOM_BOX, pos=pos, size=size, group=4, contype=4,
+            conaffinity=12,
+        )  # fmt: skip
+        body.add_geom(
+            name=f"box_{name}_visual", type=mujoco.mjtGeom.mjGEOM_BOX, pos=pos, size=size, group=2, contype=0,
+            conaffinity=0, material="box",
+        )  # fmt: skip
+
+
+def _add_cameras(scene: mujoco.MjSpec) -> None:
+    """`hand`: on the wrist, looking past the fingers; `static`: in front of the table, sees all of it."""
+    tilt = 0.12
+    scene.body("hand").add_camera(
+        name="hand", pos=[0.065, 0, 0.0], fovy=62,
+        quat=_camera_quat(forward=[-np.sin(tilt), 0, np.cos(tilt)], up=[1, 0, 0]),
+    )  # fmt: skip
+    target, eye = np.array([0.42, -0.08, 0.1]), np.array([1.25, -0.55, 0.75])
+    scene.worldbody.add_camera(name="static", pos=eye, fovy=45, quat=_camera_quat(target - eye, up=[0, 0, 1]))
+
+
+def _camera_quat(forward: np.ndarray, up: np.ndarray) -> np.ndarray:
+    """Orientation of a MuJoCo camera (looks along -z, y up) that looks along `forward`."""
+    z = -np.asarray(forward, float) / np.linalg.norm(forward)
+    x = np.cross(up, z)
+    x /= np.linalg.norm(x)
+    quat = np.zeros(4)
+    mujoco.mju_mat2Quat(quat, np.stack([x, np.cross(z, x), z], 1).ravel())
+    return quat
