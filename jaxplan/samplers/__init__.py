@@ -1,1 +1,3 @@
-"""TODO"""
+"""Learned proposals: each `draw` gives segments for a batch of planning problems."""
+
+from jaxplan.samplers import diffusion as diffusion

@@ -1,0 +1,103 @@
+"""The diffusion sampler's network: condition, FiLM vectors, denoiser.
+
+The FiLM vectors depend on the condition and the noise step only. `film` makes them once
+for a phase, `denoise` uses them for all of its samples, and `__call__` is both in one.
+"""
+
+from typing import NamedTuple
+
+import flax.linen as nn
+import jax
+import jax.numpy as jnp
+
+from jaxplan.config import SamplerConfig
+from jaxplan.networks.film_mlp import FilmMlp
+from jaxplan.networks.joints import normalize
+from jaxplan.networks.predictor import state_vector
+from jaxplan.networks.resnet import Encoder
+from jaxplan.networks.unet1d import ConditionalUnet1D
+
+
+class Cond(NamedTuple):
+    """cond = (I, q_curr, q_goal, q_toggle, g_toggle), at the phase's start."""
+
+    image: jax.Array
+    """u8 [..., 88, 136, 3]; with `encoder=None` the predictor's features [..., F]."""
+    q: jax.Array
+    """[..., 7] [rad]."""
+    gripper: jax.Array
+    """[...], 0 open, 1 closed."""
+    q_toggle: jax.Array
+    """[..., 7] [rad]."""
+    gripper_toggle: jax.Array
+    """[...], 0 open, 1 closed."""
+    q_goal: jax.Array
+    """[..., 7] [rad]."""
+
+
+class SamplerNetwork(nn.Module):
+    """eps_theta(x_t, cond, t)."""
+
+    config: SamplerConfig
+
+    def setup(self) -> None:
+        config = self.config
+        outputs = len(config.q_min) + 1
+        self.encoder = config.encoder and Encoder(config.encoder)
+        self.image_norm = nn.LayerNorm()
+        self.state = _mlp(64, 64)
+        self.targets = _mlp(128, 128)
+        self.project = nn.Dense(config.cond_features)
+        self.step = _mlp(4 * config.step_features, config.step_features)
+        if config.denoiser == "unet1d":
+            self.denoiser = ConditionalUnet1D(config.hidden)
+        else:
+            self.denoiser = FilmMlp(config.hidden, outputs)
+        self.modulation = nn.Dense(sum(self.denoiser.film_sizes))
+
+    def cond(self, cond: Cond) -> jax.Array:
+        """The 256-vector of a condition, [..., cond_features]."""
+        config = self.config
+        image = cond.image if self.encoder is None else self.encoder(cond.image)
+        limits = config.q_min, config.q_max
+        targets = [
+            state_vector(cond.q_toggle, cond.gripper_toggle, *limits),
+            normalize(cond.q_goal, *limits),
+        ]
+        if config.relative:
+            targets += [cond.q_toggle - cond.q, cond.q_goal - cond.q]
+        parts = [
+            self.image_norm(image),
+            self.state(state_vector(cond.q, cond.gripper, *limits)),
+            self.targets(jnp.concatenate(targets, axis=-1)),
+        ]
+        return self.project(jnp.concatenate(parts, axis=-1))
+
+    def film(self, cond: jax.Array, t: jax.Array) -> jax.Array:
+        """FiLM vectors of all blocks, for cond [..., C] and noise steps t [...]."""
+        step = self.step(sinusoidal(t, self.config.step_features))
+        batch = jnp.broadcast_shapes(step.shape[:-1], cond.shape[:-1])
+        both = [jnp.broadcast_to(v, (*batch, v.shape[-1])) for v in (step, cond)]
+        return self.modulation(jax.nn.mish(jnp.concatenate(both, axis=-1)))
+
+    def denoise(self, x_t: jax.Array, film: jax.Array) -> jax.Array:
+        """eps for x_t [..., 8], with film broadcastable to [..., F]."""
+        sizes = self.denoiser.film_sizes
+        ends = [sum(sizes[: i + 1]) for i in range(len(sizes) - 1)]
+        return self.denoiser(x_t, jnp.split(film, ends, axis=-1))
+
+    def __call__(self, x_t: jax.Array, t: jax.Array, cond: Cond) -> jax.Array:
+        """eps for x_t [..., 8], t [...] and conditions [...]."""
+        return self.denoise(x_t, self.film(self.cond(cond), t))
+
+
+def sinusoidal(t: jax.Array, features: int) -> jax.Array:
+    """Sine and cosine encoding of a noise step, `[...]` to `[..., features]`."""
+    half = features // 2
+    rates = jnp.exp(-jnp.log(10000.0) * jnp.arange(half) / (half - 1))
+    angles = jnp.asarray(t, jnp.float32)[..., None] * rates
+    return jnp.concatenate([jnp.sin(angles), jnp.cos(angles)], axis=-1)
+
+
+def _mlp(hidden: int, outputs: int) -> nn.Sequential:
+    return nn.Sequential([nn.Dense(hidden), jax.nn.mish, nn.Dense(outputs)])
