@@ -12,7 +12,7 @@ Q_HOME = np.array([0.0, -0.35, 0.0, -2.2, 0.0, 1.85, 0.785])
 """Where every episode starts: gripper down, the wrist camera over the whole range of mugs [rad]."""
 
 BOX_POSITION = np.array([0.45, -0.36, 0.0])
-BOX_INNER, BOX_WALL, BOX_HEIGHT, BOX_FLOOR = 0.08, 0.005, 0.04, 0.004
+BOX_INNER, BOX_WALL, BOX_HEIGHT, BOX_FLOOR = 0.085, 0.005, 0.04, 0.004
 """Half of the inner side, half of the wall's thickness, height and floor thickness [m]."""
 
 IMAGE_HEIGHT, IMAGE_WIDTH = 88, 136
@@ -104,10 +104,10 @@ def _add_box(scene: mujoco.MjSpec) -> None:
 
 def _add_cameras(scene: mujoco.MjSpec) -> None:
     """`hand`: on the wrist, looking past the fingers; `static`: in front of the table, sees all of it."""
-    tilt = 0.12
+    tilt = -0.12
     scene.body("hand").add_camera(
-        name="hand", pos=[0.065, 0, 0.0], fovy=62,
-        quat=_camera_quat(forward=[-np.sin(tilt), 0, np.cos(tilt)], up=[1, 0, 0]),
+        name="hand", pos=[-0.065, 0, 0.0], fovy=50,
+        quat=_camera_quat(forward=[-np.sin(tilt), 0, np.cos(tilt)], up=[-1, 0, 0]),
     )  # fmt: skip
     target, eye = np.array([0.42, -0.08, 0.1]), np.array([1.25, -0.55, 0.75])
     scene.worldbody.add_camera(name="static", pos=eye, fovy=45, quat=_camera_quat(target - eye, up=[0, 0, 1]))

@@ -1,0 +1,139 @@
+"""The scripted expert: where the gripper toggles next, and the keyframes on the way there.
+
+Its answers are a function of the mug's pose, the joints and the gripper alone. One rim side, one
+finger flip and one pitch serve the whole range of mugs, and inverse kinematics is continued from
+one reference, so that labels never jump (methods: labels must be single-valued).
+"""
+
+from enum import IntEnum
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from jaxplan.tasks.mug.kinematics import InverseKinematics
+from jaxplan.tasks.mug.mug import MugShape
+from jaxplan.tasks.mug.scene import BOX_FLOOR, BOX_POSITION, Q_HOME
+
+UP = np.array([0.0, 0.0, 1.0])
+PITCH = np.radians(45)
+INSERTION = 0.004
+"""Depth of the pads' centres below the rim [m]; the pads' corners reach 12 mm."""
+STAGING = np.array([0.48, 0.0])
+"""Where the mug is put upright [m]."""
+STAGING_YAW = np.radians(140)
+BOX_YAW = np.radians(120)
+"""Directions of the handle when put upright and in the box [rad]."""
+DROP = 0.0015
+"""Gap below the mug when it is let go [m]."""
+Q_RIM = np.array([0.1367, 0.4522, 0.1779, -2.3652, -1.1305, 2.1755, 0.4094])
+"""Reference of the rim grasp, in the middle of the range [rad]."""
+
+
+class Toggle(IntEnum):
+    """The four contact events, in order."""
+
+    GRASP1 = 0
+    RELEASE1 = 1
+    GRASP2 = 2
+    RELEASE2 = 3
+
+
+class Keyframes(NamedTuple):
+    """Joint configurations on the way to a toggle, the toggle itself last."""
+
+    toggle: Toggle
+    q: np.ndarray
+    """(3, 7) [rad]: transit (looks again), pre-contact, toggle."""
+    error: float
+    """Largest pose error that inverse kinematics left [m + rad]."""
+
+
+class Expert:
+    """Answers what the predictor learns to answer, from the state that the predictor never sees."""
+
+    def __init__(self, model: mujoco.MjModel, shape: MugShape = MugShape()) -> None:
+        self._ik = InverseKinematics(model)
+        self._shape = shape
+
+    def next_toggle(self, mug: np.ndarray, q: np.ndarray, closed: bool) -> Toggle:
+        """Which event comes next, for a mug pose (4, 4), joints [rad] and gripper."""
+        if not closed:
+            return Toggle.GRASP2 if mug[2, 2] > 0.9 else Toggle.GRASP1
+        position, _ = self._ik.pose(q)
+        inside = mug[:3, :3].T @ (position - mug[:3, 3])
+        by_handle = np.hypot(inside[0], inside[1]) > (self._shape.radius + self._shape.handle_grip[0]) / 2
+        return Toggle.RELEASE2 if by_handle else Toggle.RELEASE1
+
+    def keyframes(self, mug: np.ndarray, q: np.ndarray, closed: bool) -> Keyframes:
+        """Keyframes of the next toggle.
+
+        Args:
+            mug: Pose of the mug in the world, (4, 4).
+            q: Joints at the start [rad]; while the gripper is closed they tell how the mug is held.
+            closed: Whether the gripper is closed.
+        """
+        toggle = self.next_toggle(mug, q, closed)
+        targets, reference = {
+            Toggle.GRASP1: self._grasp_rim,
+            Toggle.RELEASE1: self._put_upright,
+            Toggle.GRASP2: self._grasp_handle,
+            Toggle.RELEASE2: self._put_in_box,
+        }[toggle](mug, q)
+        solved = [self._ik.solve(t[:3, 3], t[:3, :3], reference) for t in targets]
+        return Keyframes(toggle, np.stack([s[0] for s in solved]), max(s[1] for s in solved))
+
+    def _grasp_rim(self, mug, q):
+        axis = mug[:3, 2] * [1, 1, 0]
+        axis /= np.linalg.norm(axis)
+        side = np.cross(UP, axis)
+        shape = self._shape
+        contact = mug[:3, 3] + axis * (shape.height / 2 - INSERTION) + side * (shape.radius - shape.wall / 2)
+        contact[2] = shape.radius
+        approach = -axis * np.cos(PITCH) - UP * np.sin(PITCH)
+        grasp = _pose(contact, np.stack([np.cross(-side, approach), -side, approach], 1))
+        return [_moved(grasp, -0.11 * approach + [0, 0, 0.05]), _moved(grasp, -0.06 * approach), grasp], Q_RIM
+
+    def _put_upright(self, mug, q):
+        target = _pose([*STAGING, self._shape.height / 2 + DROP], _yaw(STAGING_YAW))
+        release = self._hand_for(mug, q, target)
+        lift = _moved(_pose(*self._ik.pose(q)), [0, 0, 0.10])
+        return [lift, _moved(release, [0, 0, 0.05]), release], Q_RIM
+
+    def _grasp_handle(self, mug, q):
+        radius, height = self._shape.handle_grip
+        out = mug[:3, 0] * [1, 1, 0]
+        out /= np.linalg.norm(out)
+        across = np.cross(out, UP)
+        contact = mug[:3, 3] + out * radius
+        contact[2] = mug[2, 3] - self._shape.height / 2 + height
+        grasp = _pose(contact, np.stack([np.cross(across, -UP), across, -UP], 1))
+        return [_moved(grasp, [0, 0, 0.16]), _moved(grasp, [0, 0, 0.06]), grasp], Q_HOME
+
+    def _put_in_box(self, mug, q):
+        middle = BOX_POSITION + [0, 0, BOX_FLOOR + self._shape.height / 2 + DROP]
+        release = self._hand_for(mug, q, _pose(middle, _yaw(BOX_YAW)))
+        lift = _moved(_pose(*self._ik.pose(q)), [0, 0, 0.12])
+        return [lift, _moved(release, [0, 0, 0.09]), release], Q_HOME
+
+    def _hand_for(self, mug, q, target):
+        """Pose of the tool centre point that brings the mug it holds to `target`."""
+        hand = _pose(*self._ik.pose(q))
+        return target @ np.linalg.inv(mug) @ hand
+
+
+def _pose(position, rotation) -> np.ndarray:
+    pose = np.eye(4)
+    pose[:3, :3], pose[:3, 3] = rotation, position
+    return pose
+
+
+def _moved(pose: np.ndarray, offset) -> np.ndarray:
+    moved = pose.copy()
+    moved[:3, 3] += offset
+    return moved
+
+
+def _yaw(angle: float) -> np.ndarray:
+    return Rotation.from_euler("z", angle).as_matrix()

@@ -1,0 +1,67 @@
+"""Inverse kinematics that never jumps: continued from a reference pose, with a fixed null-space rule."""
+
+import mujoco
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+
+
+class InverseKinematics:
+    """Joint angles that bring the tool centre point to a pose.
+
+    The answer is a continuous function of the pose: each solve starts at the same reference
+    configuration, walks the straight line (and the geodesic turn) from the reference's pose to
+    the target in small steps, and settles in the null space nearest to the reference.
+    """
+
+    def __init__(self, model: mujoco.MjModel) -> None:
+        self._model = model
+        self._data = mujoco.MjData(model)
+        self._site = model.site("tcp").id
+        self._jacobian = np.zeros((6, model.nv))
+        self._lower, self._upper = model.jnt_range[:7].T + [[0.02], [-0.02]]
+
+    def pose(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Position [m] and rotation matrix of the tool centre point."""
+        self._data.qpos[:7] = q
+        mujoco.mj_kinematics(self._model, self._data)
+        return self._data.site_xpos[self._site].copy(), self._data.site_xmat[self._site].reshape(3, 3).copy()
+
+    def solve(
+        self, position: np.ndarray, rotation: np.ndarray, q_reference: np.ndarray, step: float = 0.1, settle: int = 25
+    ) -> tuple[np.ndarray, float]:
+        """Solves for a pose of the tool centre point.
+
+        Args:
+            position: Target [m], shape (3,).
+            rotation: Target axes as columns, shape (3, 3).
+            q_reference: Where the continuation starts and what the null space prefers [rad].
+            step: Longest stride of the continuation [m and rad].
+            settle: Iterations at the target.
+
+        Returns:
+            `q` inside the joint limits, and the error that is left [m + rad].
+        """
+        p_0, r_0 = self.pose(q_reference)
+        turn = Rotation.from_matrix(rotation @ r_0.T).as_rotvec()
+        strides = int(np.ceil(max(np.linalg.norm(position - p_0) / 0.4, np.linalg.norm(turn)) / step)) + 1
+        q = q_reference.copy()
+        for s in np.append(np.linspace(0, 1, strides + 1)[1:], np.ones(settle)):
+            target = Rotation.from_rotvec(s * turn).as_matrix() @ r_0
+            q, error = self._newton(q, p_0 + s * (position - p_0), target, q_reference)
+        p, r = self.pose(q)
+        left = np.linalg.norm(position - p) + np.linalg.norm(Rotation.from_matrix(rotation @ r.T).as_rotvec())
+        return q, float(left)
+
+    def _newton(self, q, position, rotation, q_reference):
+        p, r = self.pose(q)
+        mujoco.mj_comPos(self._model, self._data)
+        mujoco.mj_jacSite(self._model, self._data, self._jacobian[:3], self._jacobian[3:], self._site)
+        jacobian = self._jacobian[:, :7]
+        w = 0.5 * (np.cross(r[:, 0], rotation[:, 0]) + np.cross(r[:, 1], rotation[:, 1]) + np.cross(r[:, 2], rotation[:, 2]))
+        error = np.concatenate([position - p, w])
+        inverse = jacobian.T @ np.linalg.inv(jacobian @ jacobian.T + 1e-5 * np.eye(6))
+        posture = 0.3 * (q_reference - q)
+        dq = inverse @ error + posture - inverse @ (jacobian @ posture)
+        dq *= min(1.0, 0.3 / (np.abs(dq).max() + 1e-9))
+        return np.clip(q + dq, self._lower, self._upper), error
