@@ -6,6 +6,7 @@ from typing import Literal
 import mujoco
 import numpy as np
 
+from jaxplan.scene.panda_visual import add_visuals
 from jaxplan.tasks.mug.mug import STIFF_CONTACT, MugShape, add_mug
 
 Q_HOME = np.array([0.0, -0.35, 0.0, -2.2, 0.0, 1.85, 0.785])
@@ -27,6 +28,7 @@ def spec(kind: Literal["physics", "planning"] = "physics", shape: MugShape = Mug
     """The scene before compilation."""
     panda = resources.files("jaxplan.scene") / "panda.xml"
     scene = mujoco.MjSpec.from_string(panda.read_text())
+    add_visuals(scene)
     scene.modelname = f"mug_{kind}"
     option = scene.option
     option.timestep = 0.002
