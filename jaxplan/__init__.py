@@ -1,3 +1,3 @@
-"""Motion planning in JAX for MuJoCo models, with learned samplers that say where to look."""
+"""Motion planning in JAX for MuJoCo models, guided by learned samplers."""
 
 __version__ = "0.1.0"
