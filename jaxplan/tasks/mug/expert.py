@@ -22,11 +22,15 @@ INSERTION = 0.004
 """Depth of the pads' centres below the rim [m]; the pads' corners reach 12 mm."""
 STAGING = np.array([0.48, 0.0])
 """Where the mug is put upright [m]."""
-STAGING_YAW = np.radians(140)
-BOX_YAW = np.radians(120)
-"""Directions of the handle when put upright and in the box [rad]."""
+STAGING_YAWS = np.radians([-150, 100])
+"""Direction of the handle when put upright [rad]: of a mug that lay on its left or right side, so
+that neither asks for a large turn of the wrist."""
+BOX_YAWS = np.radians([-120, 90])
+"""Direction of the handle in the box [rad], likewise."""
 DROP = 0.0015
 """Gap below the mug when it is let go [m]."""
+RETREAT = 0.10
+"""How far the hand backs off along its own axis after a release [m]."""
 Q_RIM = np.array([0.1367, 0.4522, 0.1779, -2.3652, -1.1305, 2.1755, 0.4094])
 """Reference of the rim grasp, in the middle of the range [rad]."""
 
@@ -45,7 +49,8 @@ class Keyframes(NamedTuple):
 
     toggle: Toggle
     q: np.ndarray
-    """(3, 7) [rad]: transit (looks again), pre-contact, toggle."""
+    """(K, 7) [rad]: retreat (where a hand must leave the mug first), transit (looks again),
+    pre-contact, toggle."""
     error: float
     """Largest pose error that inverse kinematics left [m + rad]."""
 
@@ -82,6 +87,9 @@ class Expert:
             Toggle.RELEASE2: self._put_in_box,
         }[toggle](mug, q)
         solved = [self._ik.solve(t[:3, 3], t[:3, :3], reference) for t in targets]
+        if len(targets) == 4:
+            # Backing off must not change the arm's posture: continued from where the hand is.
+            solved[0] = self._ik.solve(targets[0][:3, 3], targets[0][:3, :3], q)
         return Keyframes(toggle, np.stack([s[0] for s in solved]), max(s[1] for s in solved))
 
     def _grasp_rim(self, mug, q):
@@ -96,26 +104,41 @@ class Expert:
         return [_moved(grasp, -0.11 * approach + [0, 0, 0.05]), _moved(grasp, -0.06 * approach), grasp], Q_RIM
 
     def _put_upright(self, mug, q):
-        target = _pose([*STAGING, self._shape.height / 2 + DROP], _yaw(STAGING_YAW))
+        turned = self._handle_is_right(mug, q)
+        target = _pose([*STAGING, self._shape.height / 2 + DROP], _yaw(STAGING_YAWS[turned]))
         release = self._hand_for(mug, q, target)
-        lift = _moved(_pose(*self._ik.pose(q)), [0, 0, 0.10])
+        lift = _moved(_pose(*self._ik.pose(q)), [0, 0, 0.18])
         return [lift, _moved(release, [0, 0, 0.05]), release], Q_RIM
 
     def _grasp_handle(self, mug, q):
         radius, height = self._shape.handle_grip
         out = mug[:3, 0] * [1, 1, 0]
         out /= np.linalg.norm(out)
-        across = np.cross(out, UP)
+        across = np.cross(out, UP) * (1 if out[1] > 0 else -1)
         contact = mug[:3, 3] + out * radius
         contact[2] = mug[2, 3] - self._shape.height / 2 + height
         grasp = _pose(contact, np.stack([np.cross(across, -UP), across, -UP], 1))
-        return [_moved(grasp, [0, 0, 0.16]), _moved(grasp, [0, 0, 0.06]), grasp], Q_HOME
+        frames = [_moved(grasp, [0, 0, 0.16]), _moved(grasp, [0, 0, 0.06]), grasp]
+        hand = _pose(*self._ik.pose(q))
+        at_rim = hand[2, 2] > -0.9 and np.linalg.norm(hand[:3, 3] - mug[:3, 3]) < 0.10
+        return ([_moved(hand, -RETREAT * hand[:3, 2]), *frames] if at_rim else frames), Q_HOME
 
     def _put_in_box(self, mug, q):
         middle = BOX_POSITION + [0, 0, BOX_FLOOR + self._shape.height / 2 + DROP]
-        release = self._hand_for(mug, q, _pose(middle, _yaw(BOX_YAW)))
+        release = self._hand_for(mug, q, _pose(middle, _yaw(BOX_YAWS[int(mug[1, 0] > 0)])))
         lift = _moved(_pose(*self._ik.pose(q)), [0, 0, 0.12])
         return [lift, _moved(release, [0, 0, 0.09]), release], Q_HOME
+
+    def _handle_is_right(self, mug, q) -> int:
+        """Whether the handle lies on the other side of the axis than the rim that is held."""
+        position, _ = self._ik.pose(q)
+        return int(np.dot(mug[:3, 0], position - mug[:3, 3]) < 0)
+
+    def retreat(self, q: np.ndarray) -> np.ndarray:
+        """Joints [rad] of a hand that has backed off along its own axis."""
+        hand = _pose(*self._ik.pose(q))
+        target = _moved(hand, -RETREAT * hand[:3, 2])
+        return self._ik.solve(target[:3, 3], target[:3, :3], q)[0]
 
     def _hand_for(self, mug, q, target):
         """Pose of the tool centre point that brings the mug it holds to `target`."""
