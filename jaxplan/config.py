@@ -3,8 +3,10 @@
 A file in `configs/` holds differences from these defaults and nothing else.
 """
 
-from dataclasses import dataclass
-from typing import Literal
+import types
+import typing
+from dataclasses import dataclass, fields, is_dataclass
+from typing import Any, Literal
 
 
 @dataclass(frozen=True)
@@ -28,6 +30,8 @@ class PlannerConfig:
     """A node reaches q_goal within this distance [rad]."""
     goal_connect: float = 0.3
     """An accepted node nearer to q_goal than this tries the straight motion there [rad]; 0 = off."""
+    goal_tree: Literal["mirrored", "uniform"] = "mirrored"
+    """RRT-Connect's second tree: learned segments reversed, or uniform ones only."""
     toggle_tie_break: float = 0.0
     """Nodes whose distances to the target differ by less than this [rad] count as tied, and the
     one nearer to q_toggle is the base of a learned proposal (section 4.3); 0 = off."""
@@ -115,3 +119,113 @@ class SamplerConfig:
     """s in [step_min, step_max] [rad]."""
     q_min: tuple[float, ...] = PANDA_Q_MIN
     q_max: tuple[float, ...] = PANDA_Q_MAX
+
+
+@dataclass(frozen=True)
+class LossConfig:
+    """Weights of equations 1 to 3, with the numbers of section 5.1."""
+
+    w_q: float = 2.0
+    w_g: float = 1.0
+    w_s: float = 1.0
+    w_r: float = 1e-4
+    huber_kappa: float = 2.0
+    lambda_lim: float = 1.0
+    lambda_prox: float = 0.5
+    delta: float = 0.02
+    """Margin of the limit hinge, in joints scaled to [-1, 1]."""
+
+
+@dataclass(frozen=True)
+class OptimizerConfig:
+    """AdamW with warm-up and cosine decay to zero; EMA as in Diffusion Policy."""
+
+    learning_rate: float = 1e-4
+    warmup_steps: int = 500
+    betas: tuple[float, float] = (0.95, 0.999)
+    weight_decay: float = 1e-6
+    gradient_clip: float = 1.0
+    """Largest global norm of the gradient."""
+    ema_power: float = 0.75
+    ema_max: float = 0.9999
+
+
+@dataclass(frozen=True)
+class AugmentConfig:
+    """Photometric augmentation, and no other.
+
+    With a camera on the hand, shifting the image would move the mug and leave the label
+    behind.
+    """
+
+    brightness: float = 0.08
+    """Largest shift, as a share of the range."""
+    contrast: float = 0.15
+    """Largest relative change."""
+    noise: float = 0.01
+    """Standard deviation of pixel noise, as a share of the range."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrainConfig:
+    """What both trainings have in common."""
+
+    name: str
+    """The run's directory under `runs/`."""
+    data: tuple[str, ...] = ("data/mug",)
+    """Directories of demonstrations."""
+    out: str | None = None
+    """Where the weights are exported when training ends; None = in the run's directory."""
+    seed: int = 0
+    steps: int = 100_000
+    batch_size: int = 64
+    optimizer: OptimizerConfig = OptimizerConfig()
+    val_fraction: float = 0.05
+    """Share of the episodes (by seed) that is held out."""
+    log_every: int = 50
+    validate_every: int = 1000
+    checkpoint_every: int = 1000
+
+
+@dataclass(frozen=True, kw_only=True)
+class PredictorTraining(TrainConfig):
+    """`python -m jaxplan.train predictor`."""
+
+    name: str = "predictor"
+    network: PredictorConfig = PredictorConfig()
+    loss: LossConfig = LossConfig()
+    augment: AugmentConfig = AugmentConfig()
+
+
+@dataclass(frozen=True, kw_only=True)
+class SamplerTraining(TrainConfig):
+    """`python -m jaxplan.train sampler`."""
+
+    name: str = "sampler"
+    network: SamplerConfig = SamplerConfig()
+    predictor: str = "jaxplan/pretrained"
+    """Directory with the predictor's weights; read where the sampler has no encoder."""
+    target_noise: float = 0.02
+    """Standard deviation of the noise on q_toggle and q_goal in the condition [rad], so that
+    the sampler does not overtrust targets that a predictor will estimate."""
+    val_problems: int = 64
+    val_segments: int = 32
+    """Validation draws `val_segments` segments for each of `val_problems` conditions."""
+
+
+def from_dict(kind: type, values: Any) -> Any:
+    """Rebuilds a config of class `kind` from `dataclasses.asdict`, also by way of JSON.
+
+    Raises:
+        ValueError: A key that `kind` does not have.
+    """
+    if isinstance(kind, types.UnionType):
+        kinds = [k for k in typing.get_args(kind) if k is not type(None)]
+        return None if values is None else from_dict(kinds[0], values)
+    if is_dataclass(kind):
+        hints = typing.get_type_hints(kind)
+        known = {field.name for field in fields(kind)}
+        if unknown := sorted(set(values) - known):
+            raise ValueError(f"{kind.__name__} has no {', '.join(unknown)}")
+        return kind(**{name: from_dict(hints[name], v) for name, v in values.items()})
+    return tuple(values) if isinstance(values, list) else values

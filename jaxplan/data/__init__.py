@@ -1,5 +1,8 @@
 """What a demonstration is: schema, shards on disk, checksums."""
 
+from jaxplan.data.files import sha256 as sha256
+from jaxplan.data.files import write_atomic as write_atomic
+from jaxplan.data.files import write_npz as write_npz
 from jaxplan.data.schema import IMAGE_SHAPE as IMAGE_SHAPE
 from jaxplan.data.schema import JOINTS as JOINTS
 from jaxplan.data.schema import NO_PATH as NO_PATH
@@ -13,7 +16,6 @@ from jaxplan.data.shards import missing_shards as missing_shards
 from jaxplan.data.shards import read_demonstrations as read_demonstrations
 from jaxplan.data.shards import read_manifest as read_manifest
 from jaxplan.data.shards import read_shard as read_shard
-from jaxplan.data.shards import sha256 as sha256
 from jaxplan.data.shards import shard_path as shard_path
 from jaxplan.data.shards import verify as verify
 from jaxplan.data.shards import write_manifest as write_manifest

@@ -4,16 +4,14 @@ A shard appears whole or not at all (written beside, then renamed) and its bytes
 on its arrays only, so a collection that was killed and resumed equals one that was not.
 """
 
-import hashlib
-import io
 import json
 import os
-import zipfile
 from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 
+from jaxplan.data.files import sha256, write_atomic, write_npz
 from jaxplan.data.schema import DataError, Shard, check_shard, concatenate
 
 MANIFEST = "manifest.json"
@@ -26,20 +24,7 @@ def shard_path(directory: str | os.PathLike, index: int) -> Path:
 
 def write_shard(path: str | os.PathLike, shard: Shard) -> None:
     """Writes a checked shard; the same arrays give the same bytes."""
-    check_shard(shard)
-    buffer = io.BytesIO()
-    with zipfile.ZipFile(buffer, "w") as archive:
-        for name, column in shard._asdict().items():
-            member = io.BytesIO()
-            np.lib.format.write_array(member, column, allow_pickle=False)
-            # A bare ZipInfo has a fixed date, so the bytes depend on the arrays only.
-            archive.writestr(
-                zipfile.ZipInfo(f"{name}.npy"),
-                member.getbuffer(),
-                compress_type=zipfile.ZIP_DEFLATED,
-                compresslevel=1,
-            )
-    write_atomic(path, buffer.getvalue())
+    write_npz(path, check_shard(shard)._asdict())
 
 
 def read_shard(path: str | os.PathLike) -> Shard:
@@ -140,24 +125,6 @@ def missing_shards(
                 f"not {wanted}: choose another directory"
             )
     return [i for i in range(count) if not _intact(shard_path(directory, i), listed)]
-
-
-def sha256(path: str | os.PathLike) -> str:
-    """Hex SHA-256 of a file."""
-    with open(path, "rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
-
-
-def write_atomic(path: str | os.PathLike, content: bytes) -> None:
-    """Writes a file that a kill leaves either whole or as it was before."""
-    path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    beside = path.with_name(f".{path.name}.{os.getpid()}")
-    with open(beside, "wb") as file:
-        file.write(content)
-        file.flush()
-        os.fsync(file.fileno())
-    os.replace(beside, path)
 
 
 def _intact(path: Path, listed: Mapping[str, str]) -> bool:

@@ -1,0 +1,34 @@
+"""The upper network, compact: for two CPU cores.
+
+    python -m jaxplan.train predictor --config configs/predictor.py
+
+About 35 minutes on two quiet cores (250 images/s). Expected: toggle error on held-out
+episodes about 0.03 rad (median, L2 over the joints).
+"""
+
+from jaxplan.config import (
+    EncoderConfig,
+    OptimizerConfig,
+    PredictorConfig,
+    PredictorTraining,
+)
+
+predictor = PredictorTraining(
+    network=PredictorConfig(
+        encoder=EncoderConfig(
+            stem="patch4",
+            width=32,
+            blocks=(1, 1, 1),
+            last_strides=(2, 1),
+            features=128,
+            average=True,
+        ),
+        dropout=0.02,
+    ),
+    out="jaxplan/pretrained",
+    steps=8000,
+    batch_size=64,
+    optimizer=OptimizerConfig(learning_rate=1e-3, warmup_steps=200),
+    validate_every=500,
+    checkpoint_every=500,
+)

@@ -1,0 +1,45 @@
+"""Files that are whole or absent, and whose bytes depend on their content only."""
+
+import hashlib
+import io
+import os
+import zipfile
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+
+def sha256(path: str | os.PathLike) -> str:
+    """Hex SHA-256 of a file."""
+    with open(path, "rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def write_atomic(path: str | os.PathLike, content: bytes) -> None:
+    """Writes a file that a kill leaves either whole or as it was before."""
+    path = Path(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    beside = path.with_name(f".{path.name}.{os.getpid()}")
+    with open(beside, "wb") as file:
+        file.write(content)
+        file.flush()
+        os.fsync(file.fileno())
+    os.replace(beside, path)
+
+
+def write_npz(path: str | os.PathLike, arrays: Mapping[str, np.ndarray]) -> None:
+    """Writes a compressed npz without pickle; the same arrays give the same bytes."""
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w") as archive:
+        for name, array in arrays.items():
+            member = io.BytesIO()
+            np.lib.format.write_array(member, array, allow_pickle=False)
+            # A bare ZipInfo has a fixed date.
+            archive.writestr(
+                zipfile.ZipInfo(f"{name}.npy"),
+                member.getbuffer(),
+                compress_type=zipfile.ZIP_DEFLATED,
+                compresslevel=1,
+            )
+    write_atomic(path, buffer.getvalue())

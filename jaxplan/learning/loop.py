@@ -1,0 +1,191 @@
+"""The training loop: batches, logging, validation, checkpoints, exact resume."""
+
+import dataclasses
+import json
+import logging
+import time
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from tqdm import tqdm
+
+from jaxplan.config import TrainConfig
+from jaxplan.data import write_atomic
+from jaxplan.learning import checkpoint
+from jaxplan.learning.train_state import (
+    Loss,
+    Params,
+    TrainState,
+    init_state,
+    optimizer,
+    train_step,
+)
+
+logger = logging.getLogger(__name__)
+
+Metrics = dict[str, float]
+
+
+class TrainingDiverged(ValueError):
+    """The loss or a weight is no longer finite."""
+
+
+class RunError(ValueError):
+    """The run's directory belongs to another run."""
+
+
+def fit(
+    config: TrainConfig,
+    run: Path,
+    params: Params,
+    loss: Loss,
+    rows: np.ndarray,
+    gather: Callable[[np.ndarray], Any],
+    validate: Callable[[Params], Metrics],
+) -> tuple[TrainState, Metrics]:
+    """Trains from the run's newest checkpoint, or from `params`, to `config.steps`.
+
+    Args:
+        config: Steps, batch size, optimiser, intervals, seed.
+        run: Directory for `config.json`, `metrics.jsonl` and `checkpoints/`.
+        params: Initial weights.
+        loss: loss(params, key, batch) -> (loss, metrics); jitted here.
+        rows: Rows of the data set to train on.
+        gather: Rows [batch_size] to the batch that `loss` takes.
+        validate: Metrics of the averaged weights on what was held out.
+
+    Returns:
+        The final state and its validation metrics.
+
+    Raises:
+        TrainingDiverged: Not finite any more; the last good checkpoint is kept.
+        RunError: `run` was begun with other settings.
+    """
+    tx = optimizer(config.optimizer, config.steps)
+    state = init_state(params, tx)
+    _claim(run, config)
+    store = run / "checkpoints"
+    if (last := checkpoint.latest(store)) is not None:
+        state = checkpoint.restore(store, last, state)
+        logger.info("resumed %s at step %d", run, last)
+    first = int(state.step)
+    _forget_after(run / "metrics.jsonl", first)
+
+    step_fn = jax.jit(partial(train_step, loss, tx, config.optimizer), donate_argnums=0)
+    key = jax.random.key(config.seed)
+    measured: Metrics = {}
+    began = time.perf_counter()
+    bar = tqdm(total=config.steps, initial=first, desc=config.name, unit="step")
+    with bar, (run / "metrics.jsonl").open("a") as log:
+        for step in range(first, config.steps):
+            batch = gather(rows_of_step(config, rows, step))
+            state, metrics = step_fn(state, key, batch)
+            done, last_step = step + 1, step + 1 == config.steps
+            if done % config.log_every == 0 or last_step:
+                values = {name: float(value) for name, value in metrics.items()}
+                _check_finite(values["loss"], done)
+                rate = (
+                    (done - first) * config.batch_size / (time.perf_counter() - began)
+                )
+                _write(log, {"step": done, **values, "examples_per_second": rate})
+                bar.update(done - bar.n)
+                bar.set_postfix(loss=f"{values['loss']:.2e}", refresh=False)
+            if done % config.validate_every == 0 or last_step:
+                measured = validate(state.ema_params)
+                _write(
+                    log, {"step": done, **{f"val_{k}": v for k, v in measured.items()}}
+                )
+                logger.info("step %d: %s", done, _line(measured))
+            if done % config.checkpoint_every == 0 or last_step:
+                _check_finite(float(metrics["loss"]), done)
+                if not _all_finite(state):
+                    raise TrainingDiverged(_diverged("a weight", done))
+                checkpoint.save(store, done, state)
+    if first == config.steps:
+        measured = validate(state.ema_params)
+    return state, measured
+
+
+def rows_of_step(config: TrainConfig, rows: np.ndarray, step: int) -> np.ndarray:
+    """The rows of step `step`, a function of the seed and the step only.
+
+    So a run can be resumed anywhere. Each epoch is its own permutation; its odd rest is
+    left out.
+    """
+    size = min(config.batch_size, len(rows))
+    epoch, position = divmod(step, len(rows) // size)
+    order = np.random.default_rng([config.seed, epoch]).permutation(len(rows))
+    return rows[order[position * size : (position + 1) * size]]
+
+
+def held_out(seeds: np.ndarray, fraction: float) -> np.ndarray:
+    """Mask of the rows whose episode is held out; the choice depends on the seed alone.
+
+    At least one episode is held out, and where there are two, one is trained on.
+    """
+    unique = np.unique(seeds)
+    order = np.argsort([np.random.default_rng([1, int(s)]).random() for s in unique])
+    count = min(max(1, round(fraction * len(unique))), max(1, len(unique) - 1))
+    return np.isin(seeds, unique[order[:count]])
+
+
+def _claim(run: Path, config: TrainConfig) -> None:
+    """Writes `config.json`, or checks that it holds the same settings."""
+    wanted = json.loads(json.dumps(dataclasses.asdict(config)))
+    path = run / "config.json"
+    if path.exists() and checkpoint.latest(run / "checkpoints") is not None:
+        found = json.loads(path.read_text())
+        # Where the weights go does not change what they are.
+        changed = [k for k in wanted if found.get(k) != wanted[k] and k != "out"]
+        if changed:
+            raise RunError(
+                f"{run} was begun with another {', '.join(changed)}: "
+                "choose another --name, or delete it"
+            )
+    write_atomic(path, (json.dumps(wanted, indent=2) + "\n").encode())
+
+
+def _forget_after(path: Path, step: int) -> None:
+    """Drops the lines that the steps after a checkpoint wrote before a kill."""
+    if not path.exists():
+        return
+    kept = []
+    for line in path.read_text().splitlines(keepends=True):
+        try:
+            if json.loads(line)["step"] <= step:
+                kept.append(line)
+        except ValueError:  # half a line
+            break
+    write_atomic(path, "".join(kept).encode())
+
+
+def _write(log: Any, values: dict) -> None:
+    log.write(json.dumps(values) + "\n")
+    log.flush()
+
+
+def _line(metrics: Metrics) -> str:
+    return ", ".join(f"{name} {value:.4g}" for name, value in metrics.items())
+
+
+def _check_finite(loss: float, step: int) -> None:
+    if not np.isfinite(loss):
+        raise TrainingDiverged(_diverged(f"the loss is {loss}", step))
+
+
+def _diverged(what: str, step: int) -> str:
+    return (
+        f"not finite by step {step} ({what}): stopped, the last good checkpoint is kept; "
+        "a lower --optimizer.learning-rate may help"
+    )
+
+
+@jax.jit
+def _all_finite(state: TrainState) -> jax.Array:
+    trees = state.params, state.ema_params, state.opt_state
+    return jnp.all(jnp.array([jnp.isfinite(x).all() for x in jax.tree.leaves(trees)]))

@@ -1,0 +1,59 @@
+"""The predictor's loss (equations 1 to 3), on joints scaled to [-1, 1]."""
+
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import optax
+
+from jaxplan.config import LossConfig
+from jaxplan.networks import Prediction
+
+
+class Targets(NamedTuple):
+    """Labels of a batch, joints in [-1, 1]."""
+
+    q_toggle: jax.Array
+    """[B, 7]."""
+    gripper_toggle: jax.Array
+    """[B], 0 open, 1 closed."""
+    q_goal: jax.Array
+    """[B, 7]."""
+
+
+def subgoal_loss(
+    config: LossConfig, prediction: Prediction, targets: Targets
+) -> tuple[jax.Array, dict[str, jax.Array]]:
+    """Equation 1, averaged over the batch, and its terms before weighting."""
+    terms = {
+        "toggle": huber(prediction.q_toggle - targets.q_toggle, config.huber_kappa),
+        "gripper": optax.sigmoid_binary_cross_entropy(
+            prediction.gripper_logit, targets.gripper_toggle.astype(jnp.float32)
+        ),
+        "goal": huber(prediction.q_goal - targets.q_goal, config.huber_kappa),
+        "regularizer": regularizer(config, prediction.q_toggle, prediction.q_goal),
+    }
+    weights = (config.w_q, config.w_g, config.w_s, config.w_r)
+    means = {name: jnp.mean(term) for name, term in terms.items()}
+    return sum(w * m for w, m in zip(weights, means.values(), strict=True)), means
+
+
+def huber(error: jax.Array, kappa: float) -> jax.Array:
+    """Element-wise Huber of `error` [..., 7], averaged over the joints."""
+    size = jnp.abs(error)
+    inside = 0.5 * size**2
+    return jnp.where(size <= kappa, inside, kappa * (size - 0.5 * kappa)).mean(-1)
+
+
+def regularizer(
+    config: LossConfig, q_toggle: jax.Array, q_goal: jax.Array
+) -> jax.Array:
+    """R of equation 2: limits of both, and the distance between them, [...]."""
+    limits = limit_hinge(q_toggle, config.delta) + limit_hinge(q_goal, config.delta)
+    near = jnp.sum((q_goal - q_toggle) ** 2, axis=-1)
+    return config.lambda_lim * limits + config.lambda_prox * near
+
+
+def limit_hinge(q: jax.Array, delta: float) -> jax.Array:
+    """R_lim of equation 3 with limits at -1 and 1: squared excess over 1 - delta, [...]."""
+    return jnp.sum(jnp.maximum(0.0, jnp.abs(q) - (1.0 - delta)) ** 2, axis=-1)

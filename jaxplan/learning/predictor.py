@@ -1,0 +1,126 @@
+"""Training the upper network: batches, loss, and what is measured on held-out episodes."""
+
+from collections.abc import Callable
+from functools import partial
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jaxplan.config import PredictorConfig, PredictorTraining
+from jaxplan.data import TOGGLES, Shard
+from jaxplan.learning.augment import photometric
+from jaxplan.learning.loop import Metrics
+from jaxplan.learning.losses import Targets, subgoal_loss
+from jaxplan.learning.train_state import Params
+from jaxplan.networks import Predictor, normalize, predict
+
+VALIDATION_BATCH = 256
+
+
+class Frames(NamedTuple):
+    """A batch of observations with labels, as `Shard` has them."""
+
+    image: jax.Array
+    q: jax.Array
+    gripper: jax.Array
+    q_toggle: jax.Array
+    gripper_toggle: jax.Array
+    q_goal: jax.Array
+
+
+def gather(shard: Shard, rows: np.ndarray) -> Frames:
+    """Frames `rows` of `shard`."""
+    return Frames(*(getattr(shard, name)[rows] for name in Frames._fields))
+
+
+def init(config: PredictorConfig, key: jax.Array, frames: Frames) -> Params:
+    """Fresh weights for frames of this shape."""
+    inputs = frames.image[:1], frames.q[:1], frames.gripper[:1]
+    return jax.jit(Predictor(config).init)(key, *inputs)
+
+
+def loss(
+    config: PredictorTraining, params: Params, key: jax.Array, batch: Frames
+) -> tuple[jax.Array, dict[str, jax.Array]]:
+    """Equation 1 with augmented images and dropout."""
+    key_image, key_dropout = jax.random.split(key)
+    prediction = Predictor(config.network).apply(
+        params,
+        photometric(key_image, batch.image, config.augment),
+        batch.q,
+        batch.gripper,
+        train=True,
+        rngs={"dropout": key_dropout},
+    )
+    limits = config.network.q_min, config.network.q_max
+    targets = Targets(
+        normalize(batch.q_toggle, *limits),
+        batch.gripper_toggle,
+        normalize(batch.q_goal, *limits),
+    )
+    return subgoal_loss(config.loss, prediction, targets)
+
+
+def validation(
+    config: PredictorConfig, shard: Shard, rows: np.ndarray
+) -> Callable[[Params], Metrics]:
+    """Errors over frames `rows`: L2 over the joints [rad], per toggle, and the gripper."""
+    run = jax.jit(partial(predict, config))
+
+    def validate(params: Params) -> Metrics:
+        toggle, goal, gripper = [], [], []
+        for part in batches(rows, VALIDATION_BATCH):
+            frames = gather(shard, part)
+            subgoal, _ = run(params, frames.image, frames.q, frames.gripper)
+            toggle.append(np.linalg.norm(subgoal.q_toggle - frames.q_toggle, axis=-1))
+            goal.append(np.linalg.norm(subgoal.q_goal - frames.q_goal, axis=-1))
+            gripper.append(np.asarray(subgoal.gripper_toggle) == frames.gripper_toggle)
+        errors = [np.concatenate(x)[: len(rows)] for x in (toggle, goal, gripper)]
+        return summary(*errors, shard.toggle[rows])
+
+    return validate
+
+
+def summary(
+    toggle: np.ndarray, goal: np.ndarray, gripper: np.ndarray, index: np.ndarray
+) -> Metrics:
+    """Medians, means and 90th percentiles [rad] of the errors [N]."""
+    metrics = {
+        "toggle_median": np.median(toggle),
+        "toggle_mean": toggle.mean(),
+        "toggle_p90": np.quantile(toggle, 0.9),
+        "goal_median": np.median(goal),
+        "goal_mean": goal.mean(),
+        "goal_p90": np.quantile(goal, 0.9),
+        "gripper_accuracy": gripper.mean(),
+    }
+    for i, name in enumerate(TOGGLES):
+        if (of := index == i).any():
+            metrics[f"toggle_median_{name}"] = np.median(toggle[of])
+            metrics[f"toggle_mean_{name}"] = toggle[of].mean()
+    return {name: float(value) for name, value in metrics.items()}
+
+
+def batches(rows: np.ndarray, size: int) -> list[np.ndarray]:
+    """`rows` in equal parts; the last is filled up with its own last row."""
+    size = min(size, len(rows))
+    filled = np.concatenate([rows, np.full(-len(rows) % size, rows[-1])])
+    return list(filled.reshape(-1, size))
+
+
+def image_features(
+    config: PredictorConfig, params: Params, image: np.ndarray
+) -> np.ndarray:
+    """The encoder's features of all images [N, 88, 136, 3], f32 [N, F]."""
+    zeros = jnp.zeros((1, len(config.q_min)))
+
+    @jax.jit
+    def run(params: Params, image: jax.Array) -> jax.Array:
+        q = jnp.broadcast_to(zeros, (len(image), zeros.shape[-1]))
+        return predict(config, params, image, q, q[:, 0])[1]
+
+    parts = batches(np.arange(len(image)), VALIDATION_BATCH)
+    features = [np.asarray(run(params, image[part])) for part in parts]
+    return np.concatenate(features)[: len(image)]

@@ -1,0 +1,160 @@
+"""Weights as shipped: npz files without pickle, and a manifest that ties them down.
+
+`manifest.json` holds, for each network, the file's SHA-256, the network's config, the data
+set's checksum, the commit, the versions and the held-out metrics.
+"""
+
+import dataclasses
+import json
+import os
+import subprocess
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import jax
+import numpy as np
+
+from jaxplan.config import PredictorConfig, SamplerConfig, from_dict
+from jaxplan.data import sha256, write_atomic, write_npz
+
+DIRECTORY = Path(__file__).parents[1] / "pretrained"
+"""The weights that the package ships."""
+KINDS = {"predictor": PredictorConfig, "sampler": SamplerConfig}
+MANIFEST = "manifest.json"
+
+
+class WeightsError(ValueError):
+    """Weights are missing, damaged, or do not belong together."""
+
+
+class Weights(NamedTuple):
+    """A network ready to use."""
+
+    config: Any
+    """`PredictorConfig` or `SamplerConfig`."""
+    params: dict
+    info: dict
+    """The manifest's entry."""
+
+
+def save_weights(
+    directory: str | os.PathLike, name: str, params: dict, config: Any, info: dict
+) -> Path:
+    """Writes `name.npz` and its entry in the manifest; other entries stay.
+
+    Args:
+        directory: Where; made if it does not exist.
+        name: "predictor" or "sampler".
+        params: Nested dict of arrays.
+        config: The network's config.
+        info: What else the manifest should say; must be JSON.
+    """
+    path = Path(directory) / f"{name}.npz"
+    write_npz(path, _flatten(jax.device_get(params)))
+    manifest = _read_manifest(directory) if (path.parent / MANIFEST).exists() else {}
+    manifest[name] = {
+        "file": path.name,
+        "sha256": sha256(path),
+        "config": dataclasses.asdict(config),
+        "commit": _commit(),
+        "versions": {p: version(p) for p in ("jax", "flax", "optax", "numpy")},
+        **info,
+    }
+    text = json.dumps(manifest, indent=2, sort_keys=True) + "\n"
+    write_atomic(path.parent / MANIFEST, text.encode())
+    return path
+
+
+def load_weights(name: str, directory: str | os.PathLike = DIRECTORY) -> Weights:
+    """Reads a network's weights, checksum and shapes verified.
+
+    Raises:
+        WeightsError: Missing or damaged, in one line.
+    """
+    manifest = _read_manifest(directory)
+    if name not in manifest:
+        raise WeightsError(
+            f"no {name} in {Path(directory) / MANIFEST} (there: {', '.join(manifest)})"
+        )
+    info = manifest[name]
+    try:
+        path = Path(directory) / info["file"]
+        digest, config = info["sha256"], from_dict(KINDS[name], info["config"])
+    except (KeyError, TypeError, ValueError) as error:
+        where = Path(directory) / MANIFEST
+        raise WeightsError(f"damaged manifest: {where} ({name}: {error})") from None
+    if not path.is_file():
+        raise WeightsError(f"missing weights: {path}")
+    if sha256(path) != digest:
+        raise WeightsError(
+            f"damaged weights: {path} (checksum differs from {MANIFEST})"
+        )
+    with np.load(path, allow_pickle=False) as archive:
+        params = _unflatten({key: archive[key] for key in archive.files})
+    return Weights(config, params, info)
+
+
+def load_pair(directory: str | os.PathLike = DIRECTORY) -> tuple[Weights, Weights]:
+    """The predictor, and the sampler that was trained on its features.
+
+    Raises:
+        WeightsError: As `load_weights`, or the sampler belongs to another predictor.
+    """
+    predictor = load_weights("predictor", directory)
+    sampler = load_weights("sampler", directory)
+    wanted = sampler.info.get("predictor_sha256")
+    if wanted not in (None, predictor.info["sha256"]):
+        raise WeightsError(
+            f"the sampler in {directory} was trained on another predictor's features"
+        )
+    return predictor, sampler
+
+
+def _read_manifest(directory: str | os.PathLike) -> dict:
+    path = Path(directory) / MANIFEST
+    try:
+        manifest = json.loads(path.read_text())
+    except OSError:
+        raise WeightsError(f"missing weights: no {path}") from None
+    except ValueError:
+        raise WeightsError(f"damaged manifest: {path}") from None
+    if not isinstance(manifest, dict):
+        raise WeightsError(f"damaged manifest: {path}")
+    return manifest
+
+
+def _flatten(params: dict, prefix: str = "") -> dict[str, np.ndarray]:
+    flat = {}
+    for key, value in sorted(params.items()):
+        if isinstance(value, dict):
+            flat |= _flatten(value, f"{prefix}{key}/")
+        else:
+            flat[f"{prefix}{key}"] = np.asarray(value)
+    return flat
+
+
+def _unflatten(flat: dict[str, np.ndarray]) -> dict:
+    params: dict = {}
+    for name, value in flat.items():
+        *parents, leaf = name.split("/")
+        node = params
+        for parent in parents:
+            node = node.setdefault(parent, {})
+        node[leaf] = value
+    return params
+
+
+def _commit() -> str | None:
+    """The commit of the working tree that trained, or None outside a repository."""
+    command = ["git", "describe", "--always", "--dirty", "--abbrev=40"]
+    try:
+        return subprocess.run(
+            command,
+            cwd=Path(__file__).parent,
+            capture_output=True,
+            text=True,
+            check=True,
+        ).stdout.strip()
+    except (OSError, subprocess.CalledProcessError):
+        return None

@@ -1,0 +1,113 @@
+"""Training the diffusion sampler: conditions, loss, and the angle to true directions."""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jaxplan import diffusion, samplers
+from jaxplan.config import SamplerConfig, SamplerTraining
+from jaxplan.data import Shard
+from jaxplan.learning.loop import Metrics
+from jaxplan.learning.segments import PathRows, path_rows, training_segments
+from jaxplan.learning.train_state import Params
+from jaxplan.networks import Cond, SamplerNetwork
+
+
+class Phases(NamedTuple):
+    """A batch of frames as phase starts."""
+
+    cond: Cond
+    paths: PathRows
+
+
+def gather(shard: Shard, image: np.ndarray, rows: np.ndarray) -> Phases:
+    """Frames `rows`; `image` [F, ...] holds pixels or the predictor's features."""
+    names = Cond._fields[1:]
+    cond = Cond(image[rows], *(getattr(shard, name)[rows] for name in names))
+    return Phases(cond, path_rows(shard, rows))
+
+
+def init(config: SamplerConfig, key: jax.Array, batch: Phases) -> Params:
+    """Fresh weights for conditions of this shape."""
+    cond = jax.tree.map(lambda x: x[:1], batch.cond)
+    x_t, t = jnp.zeros((1, len(config.q_min) + 1)), jnp.zeros(1, jnp.int32)
+    return jax.jit(SamplerNetwork(config).init)(key, x_t, t, cond)
+
+
+def loss(
+    config: SamplerTraining, params: Params, key: jax.Array, batch: Phases
+) -> tuple[jax.Array, dict[str, jax.Array]]:
+    """Equation 5 on fresh segments, with noise on the condition's targets."""
+    key_targets, key_segments, key_eps = jax.random.split(key, 3)
+    network = config.network
+    cond = perturb_targets(key_targets, batch.cond, config.target_noise)
+    _, segment = training_segments(
+        key_segments, batch.paths, network.step_min, network.step_max
+    )
+    x_0 = diffusion.encode(*segment, network.step_min, network.step_max)
+    model = SamplerNetwork(network)
+
+    def denoise(x_t: jax.Array, t: jax.Array) -> jax.Array:
+        return model.apply(params, x_t, t, cond)
+
+    return diffusion.eps_loss(key_eps, denoise, x_0, network.num_train_timesteps), {}
+
+
+def perturb_targets(key: jax.Array, cond: Cond, scale: float) -> Cond:
+    """Noise of `scale` [rad] on q_toggle and q_goal.
+
+    Where they are one point they stay one, as in the last phase before a toggle.
+    """
+    key_toggle, key_goal = jax.random.split(key)
+    toggle = scale * jax.random.normal(key_toggle, cond.q_toggle.shape)
+    goal = scale * jax.random.normal(key_goal, cond.q_goal.shape)
+    same = jnp.all(cond.q_toggle == cond.q_goal, axis=-1, keepdims=True)
+    return cond._replace(
+        q_toggle=cond.q_toggle + toggle,
+        q_goal=cond.q_goal + jnp.where(same, toggle, goal),
+    )
+
+
+def validation(
+    config: SamplerTraining, shard: Shard, image: np.ndarray, rows: np.ndarray
+) -> Callable[[Params], Metrics]:
+    """Loss on held-out frames, and how well drawn directions match true ones [deg].
+
+    Precision: angle of a drawn direction to the nearest true one of its phase.
+    Coverage: angle of a true direction to the nearest drawn one.
+    """
+    network, n = config.network, config.val_segments
+    key = jax.random.key(20_251_130)
+    spread = np.linspace(0, len(rows) - 1, min(len(rows), config.val_problems))
+    batch = gather(shard, image, rows[spread.astype(int)])
+    many = gather(shard, image, rows[:: max(1, len(rows) // 1024)])
+
+    @jax.jit
+    def run(params: Params, batch: Phases, many: Phases) -> dict[str, jax.Array]:
+        keys = jax.random.split(key, len(batch.paths.arc))
+        drawn = samplers.diffusion.draw(network, params, batch.cond, keys, n)
+        true = jax.vmap(
+            lambda k: training_segments(
+                k, batch.paths, network.step_min, network.step_max
+            )
+        )(jax.random.split(jax.random.fold_in(key, 1), n))[1]
+        cosine = jnp.einsum("pnj,mpj->pnm", drawn.direction, true.direction)
+        angle = jnp.degrees(jnp.arccos(jnp.clip(cosine, -1.0, 1.0)))
+        precision, coverage = angle.min(2), angle.min(1)
+        return {
+            "loss": loss(config, params, key, many)[0],
+            "precision_median": jnp.median(precision),
+            "precision_p90": jnp.quantile(precision, 0.9),
+            "coverage_median": jnp.median(coverage),
+            "coverage_p90": jnp.quantile(coverage, 0.9),
+            "length_mean": drawn.length.mean(),
+            "length_mean_true": true.length.mean(),
+        }
+
+    def validate(params: Params) -> Metrics:
+        return {name: float(value) for name, value in run(params, batch, many).items()}
+
+    return validate

@@ -1,0 +1,202 @@
+"""`python -m jaxplan.train predictor|sampler --config configs/NAME.py [--overrides]`.
+
+Trains one network from demonstrations to exported weights. Started again, it goes on from
+the run's newest checkpoint. `--help` lists every setting.
+"""
+
+import argparse
+import dataclasses
+import difflib
+import logging
+import runpy
+import sys
+from functools import partial
+from pathlib import Path
+
+import jax
+import numpy as np
+import tyro
+
+from jaxplan import data, learning
+from jaxplan.config import PredictorTraining, SamplerTraining, TrainConfig
+from jaxplan.learning import predictor, sampler, segments
+
+KINDS = {"predictor": PredictorTraining, "sampler": SamplerTraining}
+RUNS = Path("runs")
+
+logger = logging.getLogger(__name__)
+
+
+class UsageError(ValueError):
+    """The command line or the config file is wrong."""
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Runs the command; 0 when done, 2 for bad input, 1 when training diverged."""
+    logging.basicConfig(level=logging.INFO, format="%(message)s")
+    logging.getLogger("absl").setLevel(logging.WARNING)
+    try:
+        config = parse(sys.argv[1:] if arguments is None else arguments)
+        path = (
+            train_predictor(config) if _is_predictor(config) else train_sampler(config)
+        )
+        logger.info("weights: %s", path)
+        return 0
+    except learning.TrainingDiverged as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 1
+    except ValueError as error:
+        known = (
+            UsageError,
+            data.DataError,
+            learning.WeightsError,
+            learning.CheckpointError,
+            learning.RunError,
+        )
+        if not isinstance(error, known):
+            raise
+        print(f"error: {error}", file=sys.stderr)
+        return 2
+
+
+def parse(arguments: list[str]) -> TrainConfig:
+    """The config file's settings with the command line's on top."""
+    first = argparse.ArgumentParser(prog="jaxplan.train", add_help=False)
+    first.add_argument("kind", nargs="?")
+    first.add_argument("--config")
+    chosen, rest = first.parse_known_args(arguments)
+    if chosen.kind not in KINDS:
+        raise UsageError(f"train what? {' or '.join(KINDS)} (got {chosen.kind!r})")
+    default = KINDS[chosen.kind]()
+    if chosen.config is not None:
+        default = _read_config(chosen.config, chosen.kind)
+    config, unknown = tyro.cli(
+        KINDS[chosen.kind],
+        prog=f"python -m jaxplan.train {chosen.kind} [--config FILE]",
+        default=default,
+        args=rest,
+        return_unknown_args=True,
+    )
+    if unknown:
+        flags = _flags(default)
+        near = difflib.get_close_matches(unknown[0].split("=")[0], flags, 1, 0.5)
+        hint = f"; did you mean {near[0]}?" if near else "; see --help"
+        raise UsageError(f"unknown setting {unknown[0]}{hint}")
+    return config
+
+
+def train_predictor(config: PredictorTraining) -> Path:
+    """Trains the upper network and exports it; returns the weights' path."""
+    shard, hashes = _read(config)
+    held = learning.held_out(shard.seed, config.val_fraction)
+    rows, val_rows = _split(np.arange(len(shard.q)), held)
+    key = jax.random.key(config.seed)
+    gather = partial(predictor.gather, shard)
+    state, metrics = learning.fit(
+        config,
+        RUNS / config.name,
+        predictor.init(config.network, key, gather(rows[:1])),
+        partial(predictor.loss, config),
+        rows,
+        gather,
+        predictor.validation(config.network, shard, val_rows),
+    )
+    return _export(config, "predictor", state.ema_params, hashes, metrics)
+
+
+def train_sampler(config: SamplerTraining) -> Path:
+    """Trains the diffusion sampler and exports it; returns the weights' path."""
+    upper = None
+    if config.network.encoder is None:
+        upper = learning.load_weights("predictor", config.predictor)
+    shard, hashes = _read(config)
+    image = shard.image
+    if upper is not None:
+        logger.info("image features of %d frames, once", len(image))
+        image = predictor.image_features(upper.config, upper.params, image)
+    held = learning.held_out(shard.seed, config.val_fraction)
+    rows, val_rows = _split(segments.eligible(shard, config.network.step_min), held)
+    key = jax.random.key(config.seed)
+    gather = partial(sampler.gather, shard, image)
+    state, metrics = learning.fit(
+        config,
+        RUNS / config.name,
+        sampler.init(config.network, key, gather(rows[:1])),
+        partial(sampler.loss, config),
+        rows,
+        gather,
+        sampler.validation(config, shard, image, val_rows),
+    )
+    extra = {"predictor_sha256": upper.info["sha256"]} if upper else {}
+    return _export(config, "sampler", state.ema_params, hashes, metrics, extra)
+
+
+def _is_predictor(config: TrainConfig) -> bool:
+    return isinstance(config, PredictorTraining)
+
+
+def _read(config: TrainConfig) -> tuple[data.Shard, dict[str, str]]:
+    """All demonstrations, and each directory's manifest checksum."""
+    shards = [data.read_demonstrations(directory) for directory in config.data]
+    shard = shards[0] if len(shards) == 1 else data.concatenate(shards)
+    logger.info("%d frames of %d episodes", len(shard.q), len(shard.episode_seed))
+    hashes = {d: data.sha256(Path(d) / "manifest.json") for d in config.data}
+    return shard, hashes
+
+
+def _split(rows: np.ndarray, held: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Rows to train on and rows to validate on, neither empty."""
+    train, val = rows[~held[rows]], rows[held[rows]]
+    if not len(train) or not len(val):
+        raise data.DataError(
+            f"{len(train)} frames to train on and {len(val)} held out: collect more episodes"
+        )
+    return train, val
+
+
+def _export(
+    config: TrainConfig,
+    kind: str,
+    params: dict,
+    hashes: dict[str, str],
+    metrics: dict[str, float],
+    extra: dict | None = None,
+) -> Path:
+    directory = RUNS / config.name / "weights" if config.out is None else config.out
+    training = dataclasses.asdict(dataclasses.replace(config, out=None))
+    network = training.pop("network")
+    info = {"data": hashes, "metrics": metrics, "training": training, **(extra or {})}
+    del network
+    return learning.save_weights(directory, kind, params, config.network, info)
+
+
+def _read_config(path: str, kind: str) -> TrainConfig:
+    """The variable named `kind` of a config file."""
+    if not Path(path).is_file():
+        near = difflib.get_close_matches(
+            Path(path).stem, [p.stem for p in Path(path).parent.glob("*.py")], 1
+        )
+        hint = f"; did you mean {Path(path).with_name(near[0])}.py?" if near else ""
+        raise UsageError(f"no such config: {path}{hint}")
+    try:
+        config = runpy.run_path(path).get(kind)
+    except TypeError as error:  # a keyword that the dataclass does not have
+        raise UsageError(f"{path}: {error}") from None
+    if not isinstance(config, KINDS[kind]):
+        raise UsageError(f"{path} defines no `{kind} = {KINDS[kind].__name__}(...)`")
+    return config
+
+
+def _flags(config: object, prefix: str = "--") -> list[str]:
+    flags = []
+    for field in dataclasses.fields(config):
+        name = f"{prefix}{field.name.replace('_', '-')}"
+        value = getattr(config, field.name)
+        if dataclasses.is_dataclass(value):
+            flags += _flags(value, f"{name}.")
+        flags.append(name)
+    return flags
+
+
+if __name__ == "__main__":
+    sys.exit(main())
