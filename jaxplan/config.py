@@ -44,6 +44,33 @@ class PlannerConfig:
 
 
 @dataclass(frozen=True)
+class RolloutConfig:
+    """Algorithm 1's outer loop."""
+
+    max_phases: int = 24
+    merge_distance: float = 0.1
+    """A predicted subgoal this near to the toggle [rad] becomes the toggle."""
+    max_stuck: int = 2
+    """Phases in a row without a motion after which an episode has failed."""
+
+
+@dataclass(frozen=True)
+class DemonstrationConfig:
+    """What a demonstration visits and keeps. Noise is a joint's standard deviation [rad]."""
+
+    noisy_episodes: float = 0.5
+    """Share of episodes whose keyframes are driven to with noise."""
+    keyframe_noise: float = 0.03
+    toggle_noise: float = 0.006
+    frame_noise: float = 0.03
+    """Of the arms from which the camera looks beside the phase's start."""
+    perturbed_first: int = 2
+    """Frames from perturbed arms in a phase before the first grasp, where the picture decides."""
+    perturbed: int = 1
+    """The same in later phases."""
+
+
+@dataclass(frozen=True)
 class TrajectoryConfig:
     """Shortcut, B-spline, time parameterisation and dense validation (section 4.3)."""
 

@@ -15,7 +15,7 @@ LAYERS = (
     {"config", "pretrained"},
     {"scene", "planning", "trajectory", "diffusion", "data"},
     {"collision", "networks"},
-    {"samplers", "simulation"},
+    {"samplers", "simulation", "motion"},
     {"tasks", "learning", "policies"},
     {"rollout"},
     {"evaluation"},

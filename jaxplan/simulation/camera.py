@@ -1,29 +1,34 @@
 """Offscreen rendering in MuJoCo, with one line of advice where there is no GL."""
 
 import ctypes.util
+import importlib
 import os
+import sys
+import weakref
 
 import mujoco
 import numpy as np
+from mujoco.rendering.classic import gl_context
+
+ADVICE = "no OpenGL for rendering: apt install libegl1 libgl1-mesa-dri (or libosmesa6)"
 
 
 class NoGLError(RuntimeError):
     """Rendering is impossible on this machine; the message says what to install."""
 
 
-def choose_gl() -> None:
-    """Picks EGL or OSMesa where no display and no `MUJOCO_GL` is set.
+def _use_headless_gl() -> None:
+    """Without a display, makes MuJoCo's renderers use EGL, or else OSMesa.
 
-    Raises:
-        NoGLError: Neither library is installed.
+    MuJoCo chooses by `MUJOCO_GL` when it is imported, which is too early for a library to set.
     """
-    if os.environ.get("MUJOCO_GL") or os.environ.get("DISPLAY"):
+    if os.environ.get("MUJOCO_GL") or os.environ.get("DISPLAY") or sys.platform != "linux":
         return
-    for backend, library in (("egl", "EGL"), ("osmesa", "OSMesa")):
+    for name, library in (("egl", "EGL"), ("osmesa", "OSMesa")):
         if ctypes.util.find_library(library):
-            os.environ["MUJOCO_GL"] = backend
+            gl_context.GLContext = importlib.import_module(f"mujoco.{name}").GLContext
             return
-    raise NoGLError("no OpenGL library for rendering: install libegl1 (or libosmesa6), or set MUJOCO_GL")
+    raise NoGLError(ADVICE)
 
 
 class Camera:
@@ -39,13 +44,13 @@ class Camera:
     """
 
     def __init__(self, model: mujoco.MjModel, height: int, width: int) -> None:
-        choose_gl()
         try:
+            _use_headless_gl()
             self._renderer = mujoco.Renderer(model, height, width)
         except (mujoco.FatalError, AttributeError, ImportError, RuntimeError) as error:
-            raise NoGLError(
-                f"cannot render ({error}): install libegl1 and libgl1-mesa-dri (or libosmesa6 with MUJOCO_GL=osmesa)"
-            ) from error
+            raise NoGLError(f"{ADVICE} ({error})") from error
+        # Without this the interpreter takes down EGL before the renderer that needs it.
+        weakref.finalize(self, self._renderer.close)
         options = mujoco.MjvOption()
         options.geomgroup[:] = 0
         options.geomgroup[[0, 1, 2]] = 1

@@ -12,7 +12,7 @@ import mujoco
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from jaxplan.tasks.mug.kinematics import InverseKinematics
+from jaxplan.tasks.mug.kinematics import RETREAT, InverseKinematics
 from jaxplan.tasks.mug.mug import MugShape
 from jaxplan.tasks.mug.scene import BOX_FLOOR, BOX_POSITION, Q_HOME
 
@@ -29,8 +29,6 @@ BOX_YAWS = np.radians([-120, 90])
 """Direction of the handle in the box [rad], likewise."""
 DROP = 0.0015
 """Gap below the mug when it is let go [m]."""
-RETREAT = 0.10
-"""How far the hand backs off along its own axis after a release [m]."""
 Q_RIM = np.array([0.1367, 0.4522, 0.1779, -2.3652, -1.1305, 2.1755, 0.4094])
 """Reference of the rim grasp, in the middle of the range [rad]."""
 
@@ -133,12 +131,6 @@ class Expert:
         """Whether the handle lies on the other side of the axis than the rim that is held."""
         position, _ = self._ik.pose(q)
         return int(np.dot(mug[:3, 0], position - mug[:3, 3]) < 0)
-
-    def retreat(self, q: np.ndarray) -> np.ndarray:
-        """Joints [rad] of a hand that has backed off along its own axis."""
-        hand = _pose(*self._ik.pose(q))
-        target = _moved(hand, -RETREAT * hand[:3, 2])
-        return self._ik.solve(target[:3, 3], target[:3, :3], q)[0]
 
     def _hand_for(self, mug, q, target):
         """Pose of the tool centre point that brings the mug it holds to `target`."""

@@ -6,6 +6,10 @@ from scipy.spatial.transform import Rotation
 
 
 
+RETREAT = 0.10
+"""How far the hand backs off along its own axis after a release [m]."""
+
+
 class InverseKinematics:
     """Joint angles that bring the tool centre point to a pose.
 
@@ -45,13 +49,22 @@ class InverseKinematics:
         p_0, r_0 = self.pose(q_reference)
         turn = Rotation.from_matrix(rotation @ r_0.T).as_rotvec()
         strides = int(np.ceil(max(np.linalg.norm(position - p_0) / 0.4, np.linalg.norm(turn)) / step)) + 1
-        q = q_reference.copy()
+        q, error = q_reference.copy(), np.ones(6)
         for s in np.append(np.linspace(0, 1, strides + 1)[1:], np.ones(settle)):
             target = Rotation.from_rotvec(s * turn).as_matrix() @ r_0
             q, error = self._newton(q, p_0 + s * (position - p_0), target, q_reference)
+        for _ in range(100):
+            if np.linalg.norm(error) < 1e-5:
+                break
+            q, error = self._newton(q, position, rotation, q_reference)
         p, r = self.pose(q)
         left = np.linalg.norm(position - p) + np.linalg.norm(Rotation.from_matrix(rotation @ r.T).as_rotvec())
         return q, float(left)
+
+    def retreat(self, q: np.ndarray, distance: float) -> np.ndarray:
+        """Joints [rad] of a hand that has backed off by `distance` [m] along its own axis."""
+        position, rotation = self.pose(q)
+        return self.solve(position - distance * rotation[:, 2], rotation, q)[0]
 
     def _newton(self, q, position, rotation, q_reference):
         p, r = self.pose(q)

@@ -3,13 +3,17 @@
 from collections.abc import Sequence
 from typing import NamedTuple
 
+import jax
 import mujoco
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from jaxplan.collision import World
+from jaxplan.scene import Scene
 from jaxplan.simulation.camera import Camera
 from jaxplan.simulation.physics import Simulator
 from jaxplan.tasks.mug import scene
+from jaxplan.tasks.mug.kinematics import RETREAT, InverseKinematics
 from jaxplan.tasks.mug.mug import MugShape
 
 
@@ -62,6 +66,9 @@ class MugTask:
         self._camera: Camera | None = None
         self._pads = {model.geom("left_pad").id: 0, model.geom("right_pad").id: 1}
         self._mug_body = model.body("mug").id
+        self._kinematics = InverseKinematics(model)
+        self.planning_scene = Scene.from_mjcf(scene.build("planning", shape))
+        self._allowed = {key: self.planning_scene.ignored(names) for key, names in allowed_contacts().items()}
 
     def reset(self, episodes: Sequence[int], seeds: Sequence[int]) -> None:
         """Starts episodes: arm at home, gripper open, mug dropped and come to rest.
@@ -156,6 +163,36 @@ class MugTask:
         """Opens the fingers of released grippers all the way, once the hand is away."""
         self.sim.open([e for e in episodes if not self.closed[e]], wide=True)
 
+    def wait(self, episodes: Sequence[int], seconds: float) -> None:
+        """Lets time pass."""
+        self.sim.wait(episodes, seconds)
+
+    def arrived(self, episode: int, q: np.ndarray, tolerance: float = 0.03) -> bool:
+        """Whether every joint is within `tolerance` of `q` [rad]."""
+        return bool(np.abs(self.sim.q(episode) - q).max() < tolerance)
+
+    def retreat(self, episode: int) -> np.ndarray:
+        """Joints [rad] of a hand that has backed off along its own axis; from the joints alone."""
+        return self._kinematics.retreat(self.sim.q(episode), RETREAT)
+
+    def worlds(self, touching: np.ndarray) -> World:
+        """What planning may know of each episode: the mug's place, how it is held, allowed contacts.
+
+        Args:
+            touching: (batch,) phases that end in a toggle or begin after one: there the held mug
+                may meet or leave table and box, and an open hand the mug.
+        """
+        worlds = [self._world(e, bool(touching[e])) for e in range(self.batch)]
+        return jax.tree.map(lambda *leaves: np.stack(leaves), *worlds)
+
+    def _world(self, episode: int, touching: bool) -> World:
+        data, mug, held = self.sim.data[episode], self.mug(episode), self.held(episode)
+        if held:
+            mug = np.linalg.inv(self.hand_pose(data)) @ mug
+        pose = np.concatenate([mug[:3, 3], Rotation.from_matrix(mug[:3, :3]).as_quat()[[3, 0, 1, 2]]])
+        ignored = self._allowed["held" if held else "free", touching]
+        return World(np.float32(pose[None]), np.array([held]), np.float32(data.qpos[7:9].clip(0, 0.04)), ignored)
+
     def in_terminal_region(self, episode: int) -> bool:
         """Q_term: gripper open, tool centre point low over the target box. Known from the joints alone."""
         tcp = self.sim.data[episode].site("tcp").xpos
@@ -174,6 +211,19 @@ class MugTask:
             or np.linalg.norm(data.site("tcp").xpos - mug[:3, 3]) < 0.05,
         }
         return next((reason for reason, failed in checks.items() if failed), None)
+
+
+def allowed_contacts() -> dict[tuple[str, bool], list[str]]:
+    """Contacts that a phase allows, by (how the mug is, whether the phase begins or ends at a toggle)."""
+    pads = ["left_finger|mug", "right_finger|mug"]
+    hand = [*pads, "hand|mug"]
+    ground = ["mug|world", "box|mug"]
+    return {
+        ("free", False): ground,
+        ("free", True): [*ground, *pads],
+        ("held", False): hand,
+        ("held", True): [*hand, *ground],
+    }
 
 
 def sample_pose(seed: int, shape: MugShape = MugShape()) -> tuple[np.ndarray, np.ndarray]:
