@@ -76,6 +76,8 @@ def parse(arguments: list[str]) -> TrainConfig:
         default=default,
         args=rest,
         return_unknown_args=True,
+        # `encoder: EncoderConfig | None` keeps the kind that the config file gives it.
+        config=(tyro.conf.AvoidSubcommands,),
     )
     if unknown:
         flags = _flags(default)
@@ -164,9 +166,8 @@ def _export(
 ) -> Path:
     directory = RUNS / config.name / "weights" if config.out is None else config.out
     training = dataclasses.asdict(dataclasses.replace(config, out=None))
-    network = training.pop("network")
+    training.pop("network")  # `save_weights` records it
     info = {"data": hashes, "metrics": metrics, "training": training, **(extra or {})}
-    del network
     return learning.save_weights(directory, kind, params, config.network, info)
 
 

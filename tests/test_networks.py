@@ -137,25 +137,31 @@ def test_film_table_equals_the_direct_path(denoiser):
     network = SamplerNetwork(config)
     cond, t = condition(3, 12), jnp.array([0, 40, 96])
     x = jax.random.normal(jax.random.key(2), (3, 8))
-    params = network.init(jax.random.key(3), x, t, cond)
+    params = jax.jit(network.init)(jax.random.key(3), x, t, cond)
     params = jax.tree.map(
         lambda p: p + 0.01, params
     )  # past the zero-initialised output
-    direct = network.apply(params, x, t, cond)
-    vector = network.apply(params, cond, method="cond")
-    table = network.apply(params, vector, t[:, None], method="film")
-    for k in range(3):
-        row = network.apply(params, x[k], table[k, k], method="denoise")
-        np.testing.assert_allclose(row, direct[k], atol=1e-5)
+    direct = jax.jit(network.apply)(params, x, t, cond)
+
+    @jax.jit
+    def by_table(params):
+        vector = network.apply(params, cond, method="cond")
+        table = network.apply(params, vector, t[:, None], method="film")
+        rows = table[jnp.arange(3), jnp.arange(3)]
+        return network.apply(params, x, rows, method="denoise")
+
+    np.testing.assert_allclose(by_table(params), direct, atol=1e-5)
     assert np.ptp(np.asarray(direct), axis=0).max() > 1e-3
 
 
 def test_predictor_shapes_and_limits():
     config = PredictorConfig(encoder=TINY, hidden=16)
     image, q, gripper = observation(3)
-    params = Predictor(config).init(jax.random.key(0), image, q, gripper)
+    params = jax.jit(Predictor(config).init)(jax.random.key(0), image, q, gripper)
     params = jax.tree.map(lambda p: 30.0 * p, params)  # far outside the limits
-    subgoal, features = predict(config, params, image, q, gripper)
+    subgoal, features = jax.jit(predict, static_argnums=0)(
+        config, params, image, q, gripper
+    )
     assert subgoal.q_toggle.shape == subgoal.q_goal.shape == (3, 7)
     assert features.shape == (3, 8)
     for q in (subgoal.q_toggle, subgoal.q_goal):
@@ -166,11 +172,13 @@ def test_predictor_shapes_and_limits():
 def test_dropout_only_in_training():
     config = PredictorConfig(encoder=TINY, hidden=16, dropout=0.5)
     net, inputs = Predictor(config), observation(2)
-    params = net.init(jax.random.key(0), *inputs)
-    first, second = (net.apply(params, *inputs).q_toggle for _ in range(2))
-    np.testing.assert_array_equal(first, second)
-    noisy = net.apply(params, *inputs, train=True, rngs={"dropout": jax.random.key(1)})
-    assert np.abs(noisy.q_toggle - first).max() > 1e-4
+    params = jax.jit(net.init)(jax.random.key(0), *inputs)
+    run = jax.jit(net.apply, static_argnames="train")
+    plain = run(params, *inputs).q_toggle
+    still = run(params, *inputs, rngs={"dropout": jax.random.key(1)}).q_toggle
+    np.testing.assert_allclose(plain, still, atol=1e-6)
+    noisy = run(params, *inputs, train=True, rngs={"dropout": jax.random.key(1)})
+    assert np.abs(noisy.q_toggle - plain).max() > 1e-4
 
 
 def test_joints_round_trip():

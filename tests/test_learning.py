@@ -1,0 +1,415 @@
+"""Losses against their formulas, segments against their law, training against a kill."""
+
+import dataclasses
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from jaxplan import data, learning, train
+from jaxplan.config import (
+    AugmentConfig,
+    LossConfig,
+    OptimizerConfig,
+    PredictorConfig,
+    PredictorTraining,
+    SamplerTraining,
+    from_dict,
+)
+from jaxplan.learning import augment, checkpoint, losses, loop, pretrained, segments
+from jaxplan.learning.train_state import ema_decay, init_state, optimizer
+from jaxplan.networks import Prediction
+
+CONFIGS = Path(__file__).parents[1] / "configs"
+
+
+def demonstrations(episodes: int = 8, frames: int = 4) -> data.Shard:
+    """A square whose place on the image says where q_toggle is; one path an episode."""
+    rng = np.random.default_rng(0)
+    count = episodes * frames
+    at = rng.uniform(-1, 1, (episodes, 2))
+    image = np.full((count, *data.IMAGE_SHAPE), 90, np.uint8)
+    for row in range(count):
+        x, y = (at[row // frames] * (50, 30) + (68, 44)).astype(int)
+        image[row, y - 6 : y + 6, x - 6 : x + 6] = (220, 40, 40)
+    share = np.linspace(0, 1, data.PATH_POINTS)[:, None]
+    q_start = np.array([0.0, -0.5, 0.0, -2.0, 0.0, 1.5, 0.5])
+    q_goal = q_start + 0.4 * np.repeat(at, [4, 3], axis=1)
+    path_q = q_start + share * (q_goal - q_start)[:, None]
+    length = np.linalg.norm(q_goal - q_start, axis=1)
+    episode = np.repeat(np.arange(episodes), frames)
+    part = np.tile(np.linspace(0, 0.8, frames), episodes)[:, None]
+    return data.as_shard(
+        image=image,
+        q=q_start + part * (q_goal - q_start)[episode],
+        gripper=np.zeros(count),
+        q_toggle=q_goal[episode],
+        gripper_toggle=np.ones(count),
+        q_goal=q_goal[episode],
+        toggle=np.zeros(count),
+        seed=episode,
+        path=np.where(np.arange(count) % frames == frames - 1, data.NO_PATH, episode),
+        arc=part[:, 0] * length[episode],
+        path_q=path_q,
+        path_length=length,
+        episode_seed=np.arange(episodes),
+        episode_success=np.ones(episodes, bool),
+        episode_failure=[""] * episodes,
+    )
+
+
+@pytest.fixture(scope="module")
+def demos(tmp_path_factory) -> str:
+    directory = tmp_path_factory.mktemp("demos")
+    data.write_shard(data.shard_path(directory, 0), demonstrations())
+    data.write_manifest(directory, {"made": "for a test"})
+    return str(directory)
+
+
+# Losses
+
+
+def test_loss_is_equation_1():
+    """Written out element by element in NumPy."""
+    rng = np.random.default_rng(0)
+    config = LossConfig(huber_kappa=0.5, delta=0.1)
+    toggle, goal, want_toggle, want_goal = rng.normal(size=(4, 5, 7))
+    logit, mode = rng.normal(size=5), np.array([0, 1, 1, 0, 1])
+    value, _ = losses.subgoal_loss(
+        config,
+        Prediction(*map(jnp.asarray, (toggle, logit, goal, toggle))),
+        losses.Targets(*map(jnp.asarray, (want_toggle, mode, want_goal))),
+    )
+
+    def huber(e):
+        return 0.5 * e * e if abs(e) <= 0.5 else 0.5 * (abs(e) - 0.25)
+
+    expected = 0.0
+    for b in range(5):
+        p = 1 / (1 + np.exp(-logit[b]))
+        cross_entropy = -np.log(p if mode[b] else 1 - p)
+        limits = sum(
+            max(0, x - 0.9) ** 2 + max(0, -0.9 - x) ** 2 for x in (*toggle[b], *goal[b])
+        )
+        near = np.sum((goal[b] - toggle[b]) ** 2)
+        expected += (
+            2.0 * np.mean([huber(e) for e in toggle[b] - want_toggle[b]])
+            + 1.0 * cross_entropy
+            + 1.0 * np.mean([huber(e) for e in goal[b] - want_goal[b]])
+            + 1e-4 * (limits + 0.5 * near)
+        )
+    assert float(value) == pytest.approx(expected / 5, rel=1e-5)
+
+
+def test_augmentation_off_is_the_identity():
+    image = jax.random.randint(jax.random.key(0), (2, 8, 8, 3), 0, 256).astype(
+        jnp.uint8
+    )
+    off = AugmentConfig(brightness=0, contrast=0, noise=0)
+    same = augment.photometric(jax.random.key(1), image, off)
+    np.testing.assert_array_equal(same, image)
+    other = augment.photometric(jax.random.key(1), image, AugmentConfig())
+    assert 0 < np.abs(np.int32(other) - np.int32(image)).mean() < 40
+
+
+def test_ema_decay_numbers():
+    config = OptimizerConfig()
+    assert float(ema_decay(jnp.array(0), config)) == 0.0
+    for step, value in ((100, 0.969), (1000, 0.9944), (10_000, 0.9990)):
+        assert float(ema_decay(jnp.array(step), config)) == pytest.approx(
+            value, abs=1e-3
+        )
+
+
+# Segments
+
+
+def test_segments_lie_on_the_path():
+    """base and base + s u are points of the path, s is within its bounds, in order."""
+    rng = np.random.default_rng(1)
+    circle = np.linspace(0, 1.2, 64)
+    path = np.zeros((64, 7), np.float32)
+    path[:, 0], path[:, 3] = np.cos(circle), np.sin(circle)
+    rows = 256
+    arc = rng.uniform(0, 1.1, rows).astype(np.float32)
+    paths = segments.PathRows(
+        jnp.asarray(np.tile(path, (rows, 1, 1))), jnp.full(rows, 1.2), jnp.asarray(arc)
+    )
+    base, segment = segments.training_segments(jax.random.key(0), paths, 0.05, 0.2)
+    target = base + segment.length[:, None] * segment.direction
+    np.testing.assert_allclose(np.linalg.norm(segment.direction, axis=1), 1, atol=1e-5)
+    for point in (base, target):
+        np.testing.assert_allclose(np.hypot(point[:, 0], point[:, 3]), 1, atol=1e-3)
+    angle = np.arctan2(base[:, 3], base[:, 0])
+    after = np.arctan2(target[:, 3], target[:, 0])
+    assert np.all(angle >= arc - 1e-3)
+    assert np.all(angle <= 1.15 + 1e-3)
+    assert np.all(after <= 1.2 + 1e-3)
+    assert np.all((after - angle >= 0.05 - 1e-3) & (after - angle <= 0.2 + 1e-3))
+    # Uniform between the frame and the end, so half of the way on average.
+    assert np.mean((angle - arc) / (1.15 - arc)) == pytest.approx(0.5, abs=0.06)
+
+
+def test_frames_without_a_way_to_go_are_left_out():
+    shard = demonstrations()
+    shard = shard._replace(arc=shard.arc.copy())
+    shard.arc[0] = shard.path_length[0] - 0.04
+    rows = segments.eligible(shard, 0.05)
+    assert 0 not in rows
+    assert np.all(shard.path[rows] != data.NO_PATH)
+    assert len(rows) == 3 * 8 - 1
+
+
+def test_targets_that_are_one_point_stay_one():
+    from jaxplan.learning.sampler import perturb_targets
+    from jaxplan.networks import Cond
+
+    q = jax.random.normal(jax.random.key(0), (2, 7))
+    cond = Cond(q, q, q[:, 0], q, q[:, 0], q.at[1].add(0.3))
+    out = perturb_targets(jax.random.key(1), cond, 0.02)
+    np.testing.assert_array_equal(out.q_toggle[0], out.q_goal[0])
+    noise = np.asarray(out.q_goal[1] - cond.q_goal[1])
+    assert np.abs(noise - (out.q_toggle[1] - cond.q_toggle[1])).max() > 1e-3
+    assert 0.005 < noise.std() < 0.05
+
+
+# The loop
+
+
+def test_an_epoch_is_a_permutation_and_depends_on_the_seed_only():
+    config = PredictorTraining(batch_size=5, seed=3)
+    rows = np.arange(100, 123)
+    epoch = np.concatenate([loop.rows_of_step(config, rows, s) for s in range(4)])
+    assert len(set(epoch)) == 20
+    again = loop.rows_of_step(config, rows, 2)
+    np.testing.assert_array_equal(again, epoch[10:15])
+    assert not np.array_equal(loop.rows_of_step(config, rows, 6), again)
+
+
+def test_held_out_episodes_do_not_depend_on_how_many_there_are():
+    few, many = np.arange(40), np.arange(80)
+    held_few = set(few[loop.held_out(few, 0.1)])
+    held_many = set(many[loop.held_out(many, 0.1)])
+    assert len(held_few) == 4
+    assert len(held_many) == 8
+    assert held_many & set(few) <= held_few
+
+
+def toy(config, run, poison: int | None = None, stop: int | None = None):
+    """Fits a line; `stop` kills the run after so many batches."""
+    seen = []
+
+    def gather(rows):
+        if stop is not None and len(seen) == stop:
+            raise KeyboardInterrupt
+        seen.append(rows)
+        bad = poison is not None and len(seen) > poison
+        return jnp.asarray(rows * (np.nan if bad else 0.01), jnp.float32)
+
+    def loss(params, key, batch):
+        noisy = batch + 0.01 * jax.random.normal(key, batch.shape)
+        return jnp.mean((params["w"] * noisy - 2.0 * batch) ** 2), {}
+
+    def validate(params):
+        return {"w": float(params["w"])}
+
+    params = {"w": jnp.zeros(())}
+    return learning.fit(config, run, params, loss, np.arange(64), gather, validate)
+
+
+TOY = PredictorTraining(
+    name="toy",
+    steps=30,
+    batch_size=8,
+    log_every=5,
+    validate_every=15,
+    checkpoint_every=10,
+    optimizer=OptimizerConfig(learning_rate=0.1, warmup_steps=2),
+)
+
+
+def test_kill_and_resume_equals_uninterrupted(tmp_path):
+    whole, _ = toy(TOY, tmp_path / "whole")
+    with pytest.raises(KeyboardInterrupt):
+        toy(TOY, tmp_path / "cut", stop=17)
+    assert checkpoint.latest(tmp_path / "cut/checkpoints") == 10
+    resumed, _ = toy(TOY, tmp_path / "cut")
+    for a, b in zip(jax.tree.leaves(whole), jax.tree.leaves(resumed), strict=True):
+        np.testing.assert_array_equal(a, b)
+
+    def lines(run):
+        text = (tmp_path / run / "metrics.jsonl").read_text().splitlines()
+        rows = [json.loads(line) for line in text]
+        return [{k: v for k, v in r.items() if "per_second" not in k} for r in rows]
+
+    assert lines("whole") == lines("cut")
+
+
+def test_non_finite_loss_keeps_the_last_good_checkpoint(tmp_path):
+    with pytest.raises(learning.TrainingDiverged, match="not finite by step 15"):
+        toy(TOY, tmp_path, poison=12)
+    store = tmp_path / "checkpoints"
+    assert checkpoint.latest(store) == 10
+    like = init_state({"w": jnp.zeros(())}, optimizer(TOY.optimizer, TOY.steps))
+    kept = checkpoint.restore(store, 10, like)
+    assert int(kept.step) == 10
+    assert np.isfinite(kept.params["w"])
+
+
+def test_a_run_is_not_resumed_with_other_settings(tmp_path):
+    toy(TOY, tmp_path)
+    with pytest.raises(learning.RunError, match="another batch_size"):
+        toy(dataclasses.replace(TOY, batch_size=4), tmp_path)
+
+
+def test_flipped_bit_in_a_checkpoint_is_detected(tmp_path):
+    state = {"w": jnp.arange(1000.0)}
+    checkpoint.save(tmp_path, 3, state)
+    restored = checkpoint.restore(tmp_path, 3, state)
+    np.testing.assert_array_equal(restored["w"], state["w"])
+    largest = max(
+        (tmp_path / "3").rglob("*"), key=lambda p: p.is_file() * p.stat().st_size
+    )
+    content = bytearray(largest.read_bytes())
+    content[len(content) // 2] ^= 1
+    largest.write_bytes(content)
+    with pytest.raises(learning.CheckpointError, match="damaged checkpoint"):
+        checkpoint.restore(tmp_path, 3, state)
+
+
+def test_half_a_checkpoint_does_not_count(tmp_path):
+    for step in (1, 2, 3):
+        checkpoint.save(tmp_path, step, {"w": jnp.ones(3) * step})
+    assert sorted(p.name for p in tmp_path.iterdir() if p.is_dir()) == ["2", "3"]
+    (tmp_path / "3.sha256.json").unlink()
+    assert checkpoint.latest(tmp_path) == 2
+
+
+# Weights
+
+
+def test_weights_round_trip_and_damage(tmp_path):
+    params = {"params": {"a": {"kernel": np.arange(6.0).reshape(2, 3)}}}
+    config = PredictorConfig(hidden=7)
+    path = learning.save_weights(tmp_path, "predictor", params, config, {"metrics": {}})
+    weights = learning.load_weights("predictor", tmp_path)
+    assert weights.config == config
+    np.testing.assert_array_equal(
+        weights.params["params"]["a"]["kernel"], params["params"]["a"]["kernel"]
+    )
+    with pytest.raises(learning.WeightsError, match="no sampler in"):
+        learning.load_weights("sampler", tmp_path)
+    content = bytearray(path.read_bytes())
+    content[len(content) // 2] ^= 16
+    path.write_bytes(content)
+    with pytest.raises(learning.WeightsError, match="damaged weights"):
+        learning.load_weights("predictor", tmp_path)
+    path.unlink()
+    with pytest.raises(learning.WeightsError, match="missing weights"):
+        learning.load_weights("predictor", tmp_path)
+    (tmp_path / pretrained.MANIFEST).write_text("{")
+    with pytest.raises(learning.WeightsError, match="damaged manifest"):
+        learning.load_weights("predictor", tmp_path)
+
+
+def test_configs_survive_json():
+    for kind in (PredictorTraining, SamplerTraining):
+        config = kind()
+        values = json.loads(json.dumps(dataclasses.asdict(config)))
+        assert from_dict(kind, values) == config
+    with pytest.raises(ValueError, match="has no colour"):
+        from_dict(LossConfig, {"colour": 1})
+
+
+# The door
+
+
+def test_the_door_trains_both_networks(demos, tmp_path, monkeypatch):
+    """The debug recipe from demonstrations to weights, and a resume that has nothing to do."""
+    monkeypatch.chdir(tmp_path)
+    common = [
+        "--config",
+        str(CONFIGS / "debug.py"),
+        "--data",
+        demos,
+        "--out",
+        "weights",
+    ]
+    for kind, extra in (("predictor", []), ("sampler", ["--predictor", "weights"])):
+        assert train.main([kind, *common, *extra]) == 0
+    predictor, sampler = learning.load_pair("weights")
+    assert predictor.config.hidden == 32
+    assert sampler.info["predictor_sha256"] == predictor.info["sha256"]
+    assert demos in predictor.info["data"]
+    before = Path("weights/predictor.npz").read_bytes()
+    assert train.main(["predictor", *common]) == 0
+    assert Path("weights/predictor.npz").read_bytes() == before
+    lines = Path("runs/debug_predictor/metrics.jsonl").read_text().splitlines()
+    losses = [json.loads(x)["loss"] for x in lines if "loss" in json.loads(x)]
+    assert losses[-1] < losses[0]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["planner"], "predictor or sampler"),
+        (["predictor", "--stepz", "3"], "did you mean --steps"),
+        (["predictor", "--network.hiden", "3"], "did you mean --network.hidden"),
+        (
+            ["predictor", "--config", str(CONFIGS / "debgu.py")],
+            r"did you mean .*debug\.py",
+        ),
+        (["predictor", "--data", "/none"], "no such data directory: /none"),
+        (
+            ["sampler", "--config", str(CONFIGS / "sampler.py"), "--predictor", "/no"],
+            "missing weights",
+        ),
+    ],
+)
+def test_bad_input_is_one_line_and_exit_code_2(
+    arguments, message, capsys, tmp_path, monkeypatch
+):
+    import re
+
+    monkeypatch.chdir(tmp_path)
+    assert train.main(arguments) == 2
+    error = capsys.readouterr().err
+    assert error.count("\n") == 1
+    assert re.search(message, error)
+
+
+@pytest.mark.slow
+def test_killed_process_resumes(demos, tmp_path):
+    """`kill -9` in the middle of a real run, then the same command again."""
+    import os
+    import time
+
+    command = [sys.executable, "-m", "jaxplan.train", "predictor"]
+    command += ["--config", str(CONFIGS / "debug.py"), "--data", demos, "--steps", "40"]
+    environment = {**os.environ, "PYTHONPATH": str(CONFIGS.parent)}
+    outputs = []
+    for name in ("whole", "cut"):
+        run = tmp_path / name
+        run.mkdir()
+        if name == "cut":
+            with subprocess.Popen(
+                command, cwd=run, env=environment, stderr=subprocess.DEVNULL
+            ) as process:
+                store = run / "runs/debug_predictor/checkpoints"
+                while checkpoint.latest(store) is None and process.poll() is None:
+                    time.sleep(0.05)
+                process.kill()
+        subprocess.run(
+            command, cwd=run, env=environment, check=True, stderr=subprocess.DEVNULL
+        )
+        weights = learning.load_weights(
+            "predictor", run / "runs/debug_predictor/weights"
+        )
+        outputs.append(jax.tree.leaves(weights.params))
+    for a, b in zip(*outputs, strict=True):
+        np.testing.assert_allclose(a, b, atol=1e-6)
