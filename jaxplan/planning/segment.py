@@ -1,14 +1,71 @@
-"""A tree-extension segment: which way, and how far."""
+"""Tree-extension segments (u, s) and the one form in which every planner proposes.
+
+    sampler             target   direction   toward
+    classical RRT       q_rand   -           yes
+    goal bias           q_goal   -           yes
+    learned segment     q_goal   u           no
+    UniformSegment      q_rand   uniform     no
+
+The base is the node nearest to `target`; the move goes `length` from it, along
+`direction`, or straight at the target where `toward` is set.
+"""
 
 from typing import NamedTuple
 
 import jax
+import jax.numpy as jnp
+
+SNAP = 1.0001
+"""A target this share of a step away is reached: without it, a straight motion of a whole
+number of steps would end on the rounding of its last step."""
 
 
 class Segment(NamedTuple):
-    """Unit direction u and step length s (section 3.3); leading axes are batches."""
+    """Direction u and step length s of a tree extension (section 4.3)."""
 
     direction: jax.Array
-    """[..., d], |u| = 1."""
+    """`[..., d]`, of any length above zero."""
     length: jax.Array
-    """[...] [rad]."""
+    """`[...]` [rad]."""
+
+
+class Proposal(NamedTuple):
+    """One move for each of P problems."""
+
+    target: jax.Array
+    """`[P, d]` the base is the node nearest to it [rad]."""
+    direction: jax.Array
+    """`[P, d]` unit vector."""
+    length: jax.Array
+    """`[P]` [rad]."""
+    toward: jax.Array
+    """`[P]` the move goes to `target` and not along `direction`."""
+
+
+def usable(segment: Segment) -> jax.Array:
+    """Which segments are a move at all: finite, with a direction other than zero."""
+    norm = jnp.linalg.norm(segment.direction, axis=-1)
+    return jnp.isfinite(norm) & (norm > 1e-6) & jnp.isfinite(segment.length)
+
+
+def extend(
+    q_base: jax.Array, proposal: Proposal, q_min: jax.Array, q_max: jax.Array
+) -> tuple[jax.Array, jax.Array]:
+    """Carries out a proposal from its base (equation 4, with the projection to limits).
+
+    Args:
+        q_base: `[P, d]` [rad].
+        proposal: Moves, one for each row of `q_base`.
+        q_min: `[d]` lower joint limits [rad].
+        q_max: `[d]` upper joint limits [rad].
+
+    Returns:
+        `q_new [P, d]`, and `reached [P]`: whether it is the target, to the last bit.
+    """
+    gap = proposal.target - q_base
+    distance = jnp.linalg.norm(gap, axis=-1)
+    reached = proposal.toward & (distance <= SNAP * proposal.length)
+    straight = gap / jnp.maximum(distance, 1e-9)[:, None]
+    direction = jnp.where(proposal.toward[:, None], straight, proposal.direction)
+    q_new = jnp.clip(q_base + proposal.length[:, None] * direction, q_min, q_max)
+    return jnp.where(reached[:, None], proposal.target, q_new), reached

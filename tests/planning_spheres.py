@@ -1,0 +1,191 @@
+"""Problems among spheres in joint space, and a sequential planner to compare with.
+
+Motions are checked in closed form; the planner is plain NumPy, one problem at a time.
+"""
+
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jaxplan.planning import Segment
+from jaxplan.planning.proposal import draw_numbers
+
+Q_MAX = 2.0
+
+
+class Spheres(NamedTuple):
+    """Obstacles of P problems: centres `[P, S, d]`, radii `[P, S]` [rad]."""
+
+    centre: np.ndarray
+    radius: np.ndarray
+
+
+def config_free(worlds, problem, q):
+    gap = q[:, None] - worlds.centre[problem]
+    return (jnp.linalg.norm(gap, axis=-1) > worlds.radius[problem]).all(-1)
+
+
+def motion_free(worlds, problem, q0, q1):
+    centre, edge = worlds.centre[problem], (q1 - q0)[:, None]
+    along = ((centre - q0[:, None]) * edge).sum(-1) / (edge**2).sum(-1).clip(1e-12)
+    nearest = q0[:, None] + along.clip(0, 1)[..., None] * edge
+    gap = jnp.linalg.norm(centre - nearest, axis=-1)
+    return (gap > worlds.radius[problem]).all(-1)
+
+
+def problems(count, d=7, spheres=12, seed=0):
+    """Worlds in which the straight motion is blocked, starts, goals, keys.
+
+    The first sphere lies between start and goal. The spheres leave a way around: each is
+    shrunk until it holds neither end, and 12 small balls cannot wall off a 7-D box.
+    """
+    rng = np.random.default_rng(seed)
+    q_start = rng.uniform(-1.6, 1.6, (count, d))
+    step = rng.normal(size=(count, d))
+    step *= rng.uniform(0.8, 1.6, (count, 1)) / np.linalg.norm(step, axis=-1)[:, None]
+    q_goal = np.clip(q_start + step, -1.8, 1.8)
+    centre = rng.uniform(-Q_MAX, Q_MAX, (count, spheres, d))
+    centre[:, 0] = (q_start + q_goal) / 2 + 0.05 * rng.normal(size=(count, d))
+    ends = np.stack([q_start, q_goal], 1)
+    room = np.linalg.norm(ends[:, :, None] - centre[:, None], axis=-1).min(1)
+    radius = np.minimum(rng.uniform(0.3, 0.8, (count, spheres)), room - 0.08)
+    worlds = Spheres(centre.astype(np.float32), radius.clip(0.01).astype(np.float32))
+    keys = jax.vmap(jax.random.key)(jnp.arange(count) + 1000 * seed)
+    return worlds, q_start.astype(np.float32), q_goal.astype(np.float32), keys
+
+
+def noisy_sampler(q_start, q_goal, keys, rows=8, noise=0.7):
+    """Segments roughly from start to goal; segment j depends on the key and j alone."""
+    straight = (q_goal - q_start) / np.linalg.norm(q_goal - q_start, axis=-1)[:, None]
+
+    @jax.jit
+    def draw(chunk):
+        def one(key, j):
+            key = jax.random.fold_in(jax.random.fold_in(key, 7), j)
+            return jax.random.normal(key, (straight.shape[1] + 1,))
+
+        index = chunk[:, None] * rows + jnp.arange(rows)
+        z = jax.vmap(jax.vmap(one, (None, 0)))(keys, index)
+        scale = noise / np.sqrt(straight.shape[1])
+        return Segment(straight[:, None] + scale * z[..., 1:], 0.15 + 0.1 * z[..., 0])
+
+    return draw
+
+
+class Oracle:
+    """One problem, one expansion after the other, no cleverness."""
+
+    def __init__(self, world, q_start, q_goal, q_toggle, key, segments, config):
+        d = q_start.size
+        k = jnp.arange(config.max_expansions)[:, None]
+        limits = jnp.full(d, -Q_MAX), jnp.full(d, Q_MAX)
+        numbers = jax.jit(draw_numbers, static_argnums=4)(key[None], k, *limits, config)
+        self.draws = jax.tree.map(lambda x: np.asarray(x)[:, 0], numbers)
+        self.world, self.segments, self.config = world, segments, config
+        self.q_start, self.q_goal, self.q_toggle = q_start, q_goal, q_toggle
+        self.q, self.parent, self.side = [q_start], [-1], [0]
+        self.flags, self.used = [], 0
+
+    def d(self, a, b):
+        weight = 1 if self.config.metric is None else np.array(self.config.metric)
+        return np.linalg.norm(weight * (np.asarray(a) - b), axis=-1)
+
+    def nearest(self, target, side, tie_break=False):
+        nodes = [i for i, s in enumerate(self.side) if s == side]
+        gaps = self.d([self.q[i] for i in nodes], target)
+        if not tie_break:
+            return nodes[int(np.argmin(gaps))]
+        tied = [
+            i
+            for i, gap in zip(nodes, gaps, strict=True)
+            if gap <= gaps.min() + self.config.toggle_tie_break
+        ]
+        return min(tied, key=lambda i: self.d(self.q[i], self.q_toggle))
+
+    def free(self, q0, q1):
+        edge = q1 - q0
+        along = (self.world.centre - q0) @ edge / max(edge @ edge, 1e-12)
+        nearest = q0 + np.clip(along, 0, 1)[:, None] * edge
+        gap = np.linalg.norm(self.world.centre - nearest, axis=-1)
+        return bool((gap > self.world.radius).all())
+
+    def move(self, base, side, target, length, direction=None):
+        """Tries one motion; returns the new node (None: rejected) and if it is target."""
+        gap = target - self.q[base]
+        reached = direction is None and np.linalg.norm(gap) <= 1.0001 * length
+        if direction is None:
+            direction = gap / max(np.linalg.norm(gap), 1e-9)
+        q_new = np.clip(self.q[base] + length * direction, -Q_MAX, Q_MAX)
+        q_new = target if reached else q_new.astype(np.float32)
+        stands_still = np.linalg.norm(q_new - self.q[base]) <= 1e-6 and not reached
+        ok = not stands_still and self.free(self.q[base], q_new)
+        self.flags.append(ok)
+        if not ok:
+            return None, False
+        self.q.append(q_new)
+        self.parent.append(base)
+        self.side.append(side)
+        return len(self.q) - 1, reached
+
+    def expand(self, side, goal):
+        """Lines 8 to 20 of Algorithm 1 in tree `side`; returns the new node or None."""
+        config, k = self.config, len(self.flags)
+        draw = jax.tree.map(lambda x: x[k], self.draws)
+        learns = side == 0 or config.goal_tree == "mirrored"
+        if self.segments is not None and draw.learned and learns:
+            u = np.asarray(self.segments.direction[self.used])
+            s = np.asarray(self.segments.length[self.used])
+            self.used += 1
+            if np.isfinite(u).all() and np.isfinite(s) and np.linalg.norm(u) > 1e-6:
+                u = (u if side == 0 else -u) / np.linalg.norm(u)
+                s = np.clip(s, config.step_min, config.step_max)
+                base = self.nearest(goal, side, tie_break=config.toggle_tie_break > 0)
+                return self.move(base, side, goal, s, u)[0]
+        length, direction = draw.segment.length, None
+        target = goal if draw.goal else draw.q_rand
+        if not draw.goal and config.uniform_mode == "independent":
+            direction = draw.segment.direction
+        base = self.nearest(target, side)
+        return self.move(base, side, target, length, direction)[0]
+
+    def left(self):
+        return len(self.flags) < self.config.max_expansions
+
+    def chain(self, node, side, target):
+        """Straight steps from `node` (None: the nearest one); whether they arrive."""
+        node = self.nearest(target, side) if node is None else node
+        while self.left():
+            node, reached = self.move(node, side, target, self.config.step_max)
+            if node is None or reached:
+                return reached
+        return False
+
+    def rrt(self):
+        config, node = self.config, 0
+        while True:
+            if node is not None:
+                gap = self.d(self.q[node], self.q_goal)
+                if 0 < gap <= config.goal_connect and self.left():
+                    self.chain(node, 0, self.q_goal)
+                best = self.q[self.nearest(self.q_goal, 0)]
+                if self.d(best, self.q_goal) <= config.goal_tolerance:
+                    return True
+            if not self.left():
+                return False
+            node = self.expand(0, self.q_goal)
+
+    def rrt_connect(self):
+        self.q.append(self.q_goal)
+        self.parent.append(-1)
+        self.side.append(1)
+        if self.chain(None, 0, self.q_goal):
+            return True
+        side, ends = 0, (self.q_start, self.q_goal)
+        while self.left():
+            node = self.expand(side, ends[1 - side])
+            if node is not None and self.chain(None, 1 - side, self.q[node]):
+                return True
+            side = 1 - side
+        return False
