@@ -1,1 +1,9 @@
-"""TODO"""
+"""Clearance and freedom of configurations and motions, batched, on an MJX model."""
+
+from jaxplan.collision.engine import XLA_OPTIONS as XLA_OPTIONS
+from jaxplan.collision.queries import clearance as clearance
+from jaxplan.collision.queries import config_free as config_free
+from jaxplan.collision.queries import motion_free as motion_free
+from jaxplan.collision.queries import points_for as points_for
+from jaxplan.collision.world import World as World
+from jaxplan.collision.world import make_world as make_world

@@ -1,1 +1,10 @@
-"""TODO"""
+"""An MJCF as planning sees it: arm joints, limits, movable objects, contacts."""
+
+from jaxplan.scene.contacts import Contact as Contact
+from jaxplan.scene.contacts import Geoms as Geoms
+from jaxplan.scene.contacts import geom_pairs as geom_pairs
+from jaxplan.scene.scene import Scene as Scene
+from jaxplan.scene.structure import Body as Body
+from jaxplan.scene.structure import Group as Group
+from jaxplan.scene.structure import Joint as Joint
+from jaxplan.scene.structure import Structure as Structure

@@ -1,0 +1,128 @@
+"""The questions that planning asks: how far, free or not, free along a motion."""
+
+import math
+from typing import Literal
+
+import jax
+import jax.numpy as jnp
+
+from jaxplan.collision.engine import least_scores, missing_kinds
+from jaxplan.collision.narrow import Score
+from jaxplan.collision.world import World, batch_shape
+from jaxplan.scene import Scene
+
+Backend = Literal["fast", "mjx"]
+"""`fast`: our narrow phase. `mjx`: `mjx.collision`, slow, for reference."""
+
+
+def clearance(
+    scene: Scene, world: World, q: jax.Array, backend: Backend = "fast"
+) -> jax.Array:
+    """Least signed distance over all pairs that count.
+
+    Args:
+        scene: The scene.
+        world: Its leading axes broadcast against those of q.
+        q: `[..., d]` joints [rad].
+        backend: Who answers.
+
+    Returns:
+        `[...]` [m], negative = penetration; NaN where q or the world is not finite.
+    """
+    return _flat(scene, world, q, Score(exact=True), backend)
+
+
+def config_free(
+    scene: Scene,
+    world: World,
+    q: jax.Array,
+    margin: jax.typing.ArrayLike = 0.0,
+    backend: Backend = "fast",
+) -> jax.Array:
+    """Whether clearance > margin; False where something is not finite.
+
+    Args:
+        scene: The scene.
+        world: Its leading axes broadcast against those of q.
+        q: `[..., d]` joints [rad].
+        margin: [m], at least 0.
+        backend: Who answers.
+
+    Returns:
+        `[...]` bool.
+    """
+    exact = backend == "mjx"
+    return _flat(scene, world, q, Score(exact, jnp.asarray(margin)), backend) > 0
+
+
+def motion_free(
+    scene: Scene,
+    world: World,
+    q0: jax.Array,
+    q1: jax.Array,
+    points: int,
+    margin: jax.typing.ArrayLike = 0.0,
+    backend: Backend = "fast",
+) -> jax.Array:
+    """Whether the straight motion from q0 to q1 is free.
+
+    Checks `points` configurations, evenly spaced, q1 among them and q0 not: it was
+    checked when it became a node. `points_for` says how many a step length needs.
+
+    Args:
+        scene: The scene.
+        world: Its leading axes broadcast against those of q0 and q1.
+        q0: `[..., d]` start [rad].
+        q1: `[..., d]` end [rad].
+        points: Checked configurations per motion.
+        margin: [m], at least 0.
+        backend: Who answers.
+
+    Returns:
+        `[...]` bool.
+    """
+    share = (jnp.arange(points) + 1) / points
+    q0, q1 = q0[..., None, :], q1[..., None, :]
+    q = q0 + share[:, None] * (q1 - q0)
+    along = World(*(jnp.expand_dims(w, -2) for w in world))
+    along = along._replace(object_pose=jnp.expand_dims(world.object_pose, -3))
+    return jnp.all(config_free(scene, along, q, margin, backend), -1)
+
+
+def points_for(length: float, resolution: float) -> int:
+    """Configurations to check so that none of their gaps exceeds `resolution` [rad]."""
+    return max(1, math.ceil(length / resolution - 1e-9))
+
+
+def _flat(
+    scene: Scene, world: World, q: jax.Array, score: Score, backend: Backend
+) -> jax.Array:
+    """Flattens the batch, moves it to the last axis, and asks the backend."""
+    shape = batch_shape(world, q)
+    finite = jnp.isfinite(q).all(-1)
+    finite &= jnp.isfinite(world.object_pose).all((-2, -1))
+    finite &= jnp.isfinite(world.passive).all(-1)
+    flat = World(
+        _batch_last(world.object_pose, shape, 2),
+        _batch_last(world.held, shape, 1),
+        _batch_last(world.passive, shape, 1),
+        _batch_last(world.ignored, shape, 1),
+    )
+    rows = _batch_last(jnp.broadcast_to(q, (*shape, q.shape[-1])), shape, 1)
+    if backend == "fast":
+        if lacking := missing_kinds(scene):
+            kinds = ", ".join(sorted("/".join(pair) for pair in lacking))
+            raise ValueError(f"the fast backend has no {kinds}; use backend='mjx'")
+        scores = least_scores(scene, flat, rows, score)
+    else:
+        raise NotImplementedError
+    return jnp.where(finite, scores.reshape(shape), jnp.nan)
+
+
+def _batch_last(leaf: jax.Array, shape: tuple[int, ...], own: int) -> jax.Array:
+    """`[..., *own]` to `[*own, N]`, or to `[*own, 1]` if the whole batch shares it."""
+    tail = leaf.shape[leaf.ndim - own :]
+    if math.prod(leaf.shape[: leaf.ndim - own]) == 1:
+        return leaf.reshape(*tail, 1)
+    rows = jnp.broadcast_to(leaf, (*shape, *tail)).reshape(-1, *tail)
+    return jnp.moveaxis(rows, 0, -1)

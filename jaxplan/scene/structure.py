@@ -1,0 +1,179 @@
+"""The static half of a scene: names, the kinematic tree, and what can touch what."""
+
+import dataclasses
+import difflib
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import mujoco
+
+from jaxplan.scene.contacts import Contact, find_contacts
+
+SIMPLE_JOINTS = int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE)
+
+
+class Joint(NamedTuple):
+    """A hinge or slide joint."""
+
+    id: int
+    slides: bool
+    arm: int
+    """Its index in q, or -1."""
+    passive: int
+    """Its index in the passive joints, or -1."""
+
+
+class Body(NamedTuple):
+    """A body whose pose collision needs."""
+
+    id: int
+    parent: int
+    joints: tuple[Joint, ...]
+    object: int
+    """Its index in the movable objects, or -1."""
+
+
+class Group(NamedTuple):
+    """All contacts between two bodies: the unit that a phase allows or forbids."""
+
+    name: str
+    contacts: tuple[Contact, ...]
+    held: tuple[int, ...]
+    """Objects of which one must be held for the contact to depend on q; () = always."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Structure:
+    """What does not change when a geom moves. Compared by identity, so cheap under jit."""
+
+    mj_model: mujoco.MjModel
+    joints: tuple[str, ...]
+    passive: tuple[str, ...]
+    objects: tuple[str, ...]
+    hand: str
+    groups: tuple[Group, ...]
+    bodies: tuple[Body, ...]
+    """Bodies with a geom of some pair, the hand, and their ancestors. Parents stand first,
+    and movable objects last, because the hand may hold them."""
+
+
+def read_structure(
+    model: mujoco.MjModel, joints: Sequence[str] | None, hand: str | None
+) -> Structure:
+    """Reads names, tree and contacts; `Scene.from_mjcf` says what None means.
+
+    Raises:
+        ValueError: A joint or body is not in the model, or cannot be planned for.
+    """
+    chain, end = _chain(model)
+    joints = chain if joints is None else tuple(joints)
+    if not joints:
+        raise ValueError("the model has no hinge or slide joint to plan for")
+    every = [model.joint(j).name for j in range(model.njnt)]
+    for name in joints:
+        if model.joint(known(name, "joint", every)).type[0] not in SIMPLE_JOINTS:
+            raise ValueError(f"joint {name!r} is neither a hinge nor a slide")
+    bodies = [model.body(b).name for b in range(model.nbody)]
+    hand = known(hand or end, "body", bodies)
+    passive = tuple(
+        name
+        for name in every
+        if model.joint(name).type[0] in SIMPLE_JOINTS and name not in joints
+    )
+    free = model.jnt_bodyid[model.jnt_type == mujoco.mjtJoint.mjJNT_FREE]
+    objects = tuple(model.body(b).name for b in free)
+    groups = _groups(model, joints, objects)
+    needed = {int(model.body(hand).id)}
+    for group in groups:
+        needed |= {side.body for contact in group.contacts for side in contact}
+    needed = {a for body in needed for a in _line(model, body)}
+    order = sorted(needed, key=lambda b: (model.body_rootid[b] in free, b))
+    tree = tuple(_body(model, body, joints, passive, objects) for body in order)
+    return Structure(model, joints, passive, objects, hand, groups, tree)
+
+
+def known(name: str, kind: str, names: Sequence[str]) -> str:
+    """The name itself if it is among `names`, else a ValueError that suggests one."""
+    if name in names:
+        return name
+    near = difflib.get_close_matches(name, names, 1)
+    hint = f"did you mean {near[0]!r}?" if near else f"there are {', '.join(names)}"
+    raise ValueError(f"no {kind} {name!r}: {hint}")
+
+
+def _chain(model: mujoco.MjModel) -> tuple[tuple[str, ...], str]:
+    """Joints from the root down until the tree branches, and the last body before."""
+    jointed = [b for b in range(1, model.nbody) if _simple_joints(model, b)]
+    names: list[str] = []
+    end = 0
+    while True:
+        below = [b for b in jointed if end in [*_line(model, b)[1:], 0]]
+        heads = [b for b in below if not set(_line(model, b)[1:]) & set(below)]
+        if len(heads) != 1:
+            end = int(model.body_parentid[heads[0]]) if heads else end
+            return tuple(names), model.body(end).name
+        end = heads[0]
+        names += [model.joint(j).name for j in _simple_joints(model, end)]
+
+
+def _groups(
+    model: mujoco.MjModel, joints: tuple[str, ...], objects: tuple[str, ...]
+) -> tuple[Group, ...]:
+    """Contacts by pair of bodies.
+
+    A contact that q cannot change (a free object on the table) counts only while one
+    of its objects is held; without an object it never counts.
+    """
+    named: dict[str, list[Contact]] = {}
+    for contact in find_contacts(model):
+        name = "|".join(sorted(model.body(side.body).name for side in contact))
+        named.setdefault(name, []).append(contact)
+    arm = {int(model.joint(name).bodyid[0]) for name in joints}
+    groups = []
+    for name, contacts in named.items():
+        lines = [_line(model, side.body) for side in contacts[0]]
+        moved = any(arm & set(line) for line in lines)
+        roots = [model.body(line[-1]).name for line in lines if line]
+        held = tuple(objects.index(root) for root in roots if root in objects)
+        if moved or held:
+            groups.append(Group(name, tuple(contacts), () if moved else held))
+    return tuple(groups)
+
+
+def _body(
+    model: mujoco.MjModel,
+    body: int,
+    joints: tuple[str, ...],
+    passive: tuple[str, ...],
+    objects: tuple[str, ...],
+) -> Body:
+    parent = int(model.body_parentid[body])
+    if model.body(body).name in objects:
+        return Body(body, parent, (), objects.index(model.body(body).name))
+    found = []
+    first = model.body_jntadr[body]
+    for j in range(first, first + model.body_jntnum[body]):
+        name = model.joint(j).name
+        if model.jnt_type[j] not in SIMPLE_JOINTS:
+            raise ValueError(f"ball joint {name!r} is not supported")
+        slides = bool(model.jnt_type[j] == mujoco.mjtJoint.mjJNT_SLIDE)
+        arm = joints.index(name) if name in joints else -1
+        found.append(
+            Joint(int(j), slides, arm, -1 if arm >= 0 else passive.index(name))
+        )
+    return Body(body, parent, tuple(found), -1)
+
+
+def _simple_joints(model: mujoco.MjModel, body: int) -> list[int]:
+    first = model.body_jntadr[body]
+    ids = range(first, first + model.body_jntnum[body])
+    return [j for j in ids if model.jnt_type[j] in SIMPLE_JOINTS]
+
+
+def _line(model: mujoco.MjModel, body: int) -> list[int]:
+    """The body, its parent and so on, without the world."""
+    line = []
+    while body:
+        line.append(int(body))
+        body = model.body_parentid[body]
+    return line
