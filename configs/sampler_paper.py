@@ -1,5 +1,4 @@
-"""The diffusion sampler as the paper describes it: 1-D U-Net, own ResNet-18 encoder. For a
-GPU.
+"""The diffusion sampler as in the paper: 1-D U-Net, own ResNet-18. For a GPU.
 
     python -m jaxplan.train sampler --config configs/sampler_paper.py
 

@@ -12,6 +12,7 @@ import runpy
 import sys
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import jax
 import numpy as np
@@ -22,6 +23,7 @@ from jaxplan.config import PredictorTraining, SamplerTraining, TrainConfig
 from jaxplan.learning import predictor, sampler, segments
 
 KINDS = {"predictor": PredictorTraining, "sampler": SamplerTraining}
+Training = PredictorTraining | SamplerTraining
 RUNS = Path("runs")
 
 logger = logging.getLogger(__name__)
@@ -37,9 +39,10 @@ def main(arguments: list[str] | None = None) -> int:
     logging.getLogger("absl").setLevel(logging.WARNING)
     try:
         config = parse(sys.argv[1:] if arguments is None else arguments)
-        path = (
-            train_predictor(config) if _is_predictor(config) else train_sampler(config)
-        )
+        if isinstance(config, PredictorTraining):
+            path = train_predictor(config)
+        else:
+            path = train_sampler(config)
         logger.info("weights: %s", path)
         return 0
     except learning.TrainingDiverged as error:
@@ -59,7 +62,7 @@ def main(arguments: list[str] | None = None) -> int:
         return 2
 
 
-def parse(arguments: list[str]) -> TrainConfig:
+def parse(arguments: list[str]) -> Training:
     """The config file's settings with the command line's on top."""
     first = argparse.ArgumentParser(prog="jaxplan.train", add_help=False)
     first.add_argument("kind", nargs="?")
@@ -133,10 +136,6 @@ def train_sampler(config: SamplerTraining) -> Path:
     return _export(config, "sampler", state.ema_params, hashes, metrics, extra)
 
 
-def _is_predictor(config: TrainConfig) -> bool:
-    return isinstance(config, PredictorTraining)
-
-
 def _read(config: TrainConfig) -> tuple[data.Shard, dict[str, str]]:
     """All demonstrations, and each directory's manifest checksum."""
     shards = [data.read_demonstrations(directory) for directory in config.data]
@@ -157,7 +156,7 @@ def _split(rows: np.ndarray, held: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _export(
-    config: TrainConfig,
+    config: Training,
     kind: str,
     params: dict,
     hashes: dict[str, str],
@@ -171,7 +170,7 @@ def _export(
     return learning.save_weights(directory, kind, params, config.network, info)
 
 
-def _read_config(path: str, kind: str) -> TrainConfig:
+def _read_config(path: str, kind: str) -> Training:
     """The variable named `kind` of a config file."""
     if not Path(path).is_file():
         near = difflib.get_close_matches(
@@ -180,7 +179,7 @@ def _read_config(path: str, kind: str) -> TrainConfig:
         hint = f"; did you mean {Path(path).with_name(near[0])}.py?" if near else ""
         raise UsageError(f"no such config: {path}{hint}")
     try:
-        config = runpy.run_path(path).get(kind)
+        config: Any = runpy.run_path(path).get(kind)
     except TypeError as error:  # a keyword that the dataclass does not have
         raise UsageError(f"{path}: {error}") from None
     if not isinstance(config, KINDS[kind]):
@@ -188,7 +187,7 @@ def _read_config(path: str, kind: str) -> TrainConfig:
     return config
 
 
-def _flags(config: object, prefix: str = "--") -> list[str]:
+def _flags(config: Any, prefix: str = "--") -> list[str]:
     flags = []
     for field in dataclasses.fields(config):
         name = f"{prefix}{field.name.replace('_', '-')}"

@@ -21,7 +21,7 @@ from jaxplan.config import (
     SamplerTraining,
     from_dict,
 )
-from jaxplan.learning import augment, checkpoint, losses, loop, pretrained, segments
+from jaxplan.learning import augment, checkpoint, loop, losses, pretrained, segments
 from jaxplan.learning.train_state import ema_decay, init_state, optimizer
 from jaxplan.networks import Prediction
 

@@ -27,7 +27,7 @@ def save(directory: Path, step: int, state: Any) -> None:
     target = directory.resolve() / str(step)
     directory.mkdir(parents=True, exist_ok=True)
     shutil.rmtree(target, ignore_errors=True)
-    ocp.save(target, state)
+    ocp.save(str(target), state)
     text = json.dumps(_checksums(target), indent=1, sort_keys=True)
     write_atomic(_manifest(directory, step), text.encode())
     for old in _steps(directory)[:-KEPT]:
@@ -64,7 +64,7 @@ def restore(directory: Path, step: int, like: Any) -> Any:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            return ocp.load(path, abstract)
+            return ocp.load(str(path), abstract)
     except Exception as error:
         reason = (str(error) or type(error).__name__).splitlines()[0]
         raise CheckpointError(f"{path} does not fit this run ({reason})") from None

@@ -35,7 +35,8 @@ def subgoal_loss(
     }
     weights = (config.w_q, config.w_g, config.w_s, config.w_r)
     means = {name: jnp.mean(term) for name, term in terms.items()}
-    return sum(w * m for w, m in zip(weights, means.values(), strict=True)), means
+    total = jnp.dot(jnp.array(weights), jnp.stack(list(means.values())))
+    return total, means
 
 
 def huber(error: jax.Array, kappa: float) -> jax.Array:

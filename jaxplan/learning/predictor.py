@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -46,7 +46,7 @@ def loss(
 ) -> tuple[jax.Array, dict[str, jax.Array]]:
     """Equation 1 with augmented images and dropout."""
     key_image, key_dropout = jax.random.split(key)
-    prediction = Predictor(config.network).apply(
+    prediction: Any = Predictor(config.network).apply(
         params,
         photometric(key_image, batch.image, config.augment),
         batch.q,
@@ -77,8 +77,11 @@ def validation(
             toggle.append(np.linalg.norm(subgoal.q_toggle - frames.q_toggle, axis=-1))
             goal.append(np.linalg.norm(subgoal.q_goal - frames.q_goal, axis=-1))
             gripper.append(np.asarray(subgoal.gripper_toggle) == frames.gripper_toggle)
-        errors = [np.concatenate(x)[: len(rows)] for x in (toggle, goal, gripper)]
-        return summary(*errors, shard.toggle[rows])
+        # `batches` fills the last batch up; what it added is cut off again.
+        toggle, goal, gripper = (
+            np.concatenate(part)[: len(rows)] for part in (toggle, goal, gripper)
+        )
+        return summary(toggle, goal, gripper, shard.toggle[rows])
 
     return validate
 

@@ -1,7 +1,7 @@
 """Training the diffusion sampler: conditions, loss, and the angle to true directions."""
 
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -26,7 +26,8 @@ class Phases(NamedTuple):
 def gather(shard: Shard, image: np.ndarray, rows: np.ndarray) -> Phases:
     """Frames `rows`; `image` [F, ...] holds pixels or the predictor's features."""
     names = Cond._fields[1:]
-    cond = Cond(image[rows], *(getattr(shard, name)[rows] for name in names))
+    columns = [image, *(getattr(shard, name) for name in names)]
+    cond = Cond(*(jnp.asarray(column[rows]) for column in columns))
     return Phases(cond, path_rows(shard, rows))
 
 
@@ -48,7 +49,7 @@ def loss(
         key_segments, batch.paths, network.step_min, network.step_max
     )
     x_0 = diffusion.encode(*segment, network.step_min, network.step_max)
-    model = SamplerNetwork(network)
+    model: Any = SamplerNetwork(network)
 
     def denoise(x_t: jax.Array, t: jax.Array) -> jax.Array:
         return model.apply(params, x_t, t, cond)

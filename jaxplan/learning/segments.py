@@ -36,7 +36,8 @@ def eligible(shard: Shard, step_min: float) -> np.ndarray:
 def path_rows(shard: Shard, rows: np.ndarray) -> PathRows:
     """The paths of eligible frames `rows`."""
     path = shard.path[rows]
-    return PathRows(shard.path_q[path], shard.path_length[path], shard.arc[rows])
+    columns = shard.path_q[path], shard.path_length[path], shard.arc[rows]
+    return PathRows(*map(jnp.asarray, columns))
 
 
 def training_segments(

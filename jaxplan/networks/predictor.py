@@ -1,6 +1,6 @@
 """The upper network F_psi: where the gripper toggles next, and the subgoal on the way."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import flax.linen as nn
 import jax
@@ -102,5 +102,5 @@ def predict(
 
     Un-jitted: the caller jits it, with `config` static.
     """
-    prediction = Predictor(config).apply(params, image, q, gripper)
+    prediction: Any = Predictor(config).apply(params, image, q, gripper)
     return as_subgoal(config, prediction), prediction.features

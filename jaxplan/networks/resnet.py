@@ -5,6 +5,7 @@ Padding, initialisation and epsilon follow torchvision's ResNet, so that `last_s
 """
 
 from functools import partial
+from typing import Any
 
 import flax.linen as nn
 import jax
@@ -90,7 +91,9 @@ def _stem(config: EncoderConfig, x: jax.Array) -> jax.Array:
     if config.stem == "conv7":
         x = _conv(config.width, (7, 7), (2, 2), padding=((3, 3), (3, 3)))(x)
         x = nn.relu(group_norm(config.width)(x))
-        return nn.max_pool(x, (3, 3), (2, 2), padding=((1, 1), (1, 1)))
+        # Padded with -inf by `max_pool` itself.
+        pad: Any = ((1, 1), (1, 1))
+        return nn.max_pool(x, (3, 3), (2, 2), padding=pad)
     batch, height, width, channels = x.shape
     x = x.reshape(batch, height // 4, 4, width // 4, 4, channels)
     x = x.transpose(0, 1, 3, 2, 4, 5).reshape(batch, height // 4, width // 4, -1)

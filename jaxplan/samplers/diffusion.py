@@ -1,5 +1,7 @@
 """The paper's sampler: tree-extension segments from a conditional diffusion model."""
 
+from typing import Any
+
 import jax
 import jax.numpy as jnp
 
@@ -27,7 +29,7 @@ def draw(
     Returns:
         Segment with direction [P, n, 7] and length [P, n] [rad].
     """
-    network = SamplerNetwork(config)
+    network: Any = SamplerNetwork(config)
     steps = diffusion.timesteps(config.num_train_timesteps, config.num_inference_steps)
     stride = config.num_train_timesteps // config.num_inference_steps
     vector = network.apply(params, cond, method="cond")
