@@ -7,6 +7,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxplan.collision.engine import least_scores, missing_kinds
+from jaxplan.collision.mjx_backend import least_distances
 from jaxplan.collision.narrow import Score
 from jaxplan.collision.world import World, batch_shape
 from jaxplan.scene import Scene
@@ -115,7 +116,7 @@ def _flat(
             raise ValueError(f"the fast backend has no {kinds}; use backend='mjx'")
         scores = least_scores(scene, flat, rows, score)
     else:
-        raise NotImplementedError
+        scores = least_distances(scene, flat, rows) - score.margin
     return jnp.where(finite, scores.reshape(shape), jnp.nan)
 
 

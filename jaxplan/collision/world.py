@@ -44,7 +44,7 @@ def make_world(
         ignored: Names of contact groups, such as "hand|mug".
     """
     reference = scene.mj_model.qpos0
-    start = [_address(scene, name) for name in scene.objects]
+    start = [object_address(scene, name) for name in scene.objects]
     if object_pose is None:
         object_pose = np.array([reference[a : a + 7] for a in start]).reshape(-1, 7)
     if held is None:
@@ -72,7 +72,7 @@ def batch_shape(world: World, q: jax.Array) -> tuple[int, ...]:
     )
 
 
-def _address(scene: Scene, name: str) -> int:
+def object_address(scene: Scene, name: str) -> int:
     """Where the object's free joint starts in qpos."""
     model = scene.mj_model
     return int(model.jnt_qposadr[model.body(name).jntadr[0]])

@@ -146,6 +146,15 @@ class Scene:
             for i, j in geom_pairs(contact)
         ]
 
+    def group_table(self) -> np.ndarray:
+        """`[ngeom, ngeom]` contact group of each pair of geoms, -1 = none."""
+        table = np.full((self.mj_model.ngeom, self.mj_model.ngeom), -1)
+        for index, group in enumerate(self.groups):
+            for contact in group.contacts:
+                for i, j in geom_pairs(contact):
+                    table[i, j] = table[j, i] = index
+        return table
+
     def geom_name(self, geom: int) -> str:
         """A geom's name; body[number] where it has none."""
         model = self.mj_model

@@ -1,0 +1,77 @@
+"""The reference backend: `mjx.kinematics` and `mjx.collision`, any geoms that MJX has.
+
+Slow (DESIGN: 400 to 40,000 configurations/s); it is here to check the fast one, and
+for pairs of kinds that the fast one lacks.
+"""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from mujoco import mjx
+
+from jaxplan.collision.world import World, object_address
+from jaxplan.scene import Scene
+
+
+def least_distances(scene: Scene, world: World, q: jax.Array) -> jax.Array:
+    """Least signed distance over all pairs that count.
+
+    Args:
+        scene: The scene.
+        world: Leaves with the batch last, `[..., N]` or `[..., 1]`.
+        q: `[d, N]` joints.
+
+    Returns:
+        `[N]` [m].
+    """
+    empty = mjx.make_data(scene.mj_model)
+    groups = jnp.asarray(scene.group_table())
+
+    def one(q: jax.Array, world: World) -> jax.Array:
+        data = mjx.kinematics(scene.model, empty.replace(qpos=_qpos(scene, world, q)))
+        hand = int(scene.mj_model.body(scene.hand).id)
+        held = _held_poses(world, data.xpos[hand], data.xquat[hand])
+        moved = world._replace(object_pose=held)
+        data = data.replace(qpos=_qpos(scene, moved, q))
+        data = mjx.collision(scene.model, mjx.kinematics(scene.model, data))
+        contact = data._impl.contact
+        counts = [
+            ~world.ignored[i] & (world.held[np.array(g.held, int)].any() | (not g.held))
+            for i, g in enumerate(scene.groups)
+        ]
+        counts = jnp.stack([*counts, jnp.array(False)])
+        index = groups[contact.geom[:, 0], contact.geom[:, 1]]
+        return jnp.min(jnp.where(counts[index], contact.dist, jnp.inf))
+
+    axes = World(*(None if leaf.shape[-1] == 1 else -1 for leaf in world))
+    world = World(
+        *(x[..., 0] if a is None else x for a, x in zip(axes, world, strict=True))
+    )
+    return jax.vmap(one, (-1, axes))(q, world)
+
+
+def _qpos(scene: Scene, world: World, q: jax.Array) -> jax.Array:
+    model, qpos = scene.mj_model, scene.model.qpos0
+    arm = np.array([int(model.joint(name).qposadr[0]) for name in scene.joints])
+    qpos = jnp.asarray(qpos).at[arm].set(q)
+    for i, name in enumerate(scene.passive):
+        qpos = qpos.at[int(model.joint(name).qposadr[0])].set(world.passive[i])
+    for i, name in enumerate(scene.objects):
+        start = object_address(scene, name)
+        qpos = qpos.at[start : start + 7].set(world.object_pose[i])
+    return qpos
+
+
+def _held_poses(world: World, position: jax.Array, quat: jax.Array) -> jax.Array:
+    """Poses in the world; held objects' are given in the hand's frame."""
+    given = world.object_pose
+    w, v = quat[0], quat[1:]
+    ow, ov = given[:, 3:4], given[:, 4:]
+    turned = given[:, :3] + 2 * jnp.cross(
+        v, jnp.cross(v, given[:, :3]) + w * given[:, :3]
+    )
+    product = jnp.concatenate(
+        [w * ow - ov @ v[:, None], w * ov + ow * v + jnp.cross(v, ov)], -1
+    )
+    carried = jnp.concatenate([position + turned, product], -1)
+    return jnp.where(world.held[:, None], carried, given)
