@@ -39,6 +39,8 @@ class PlannerConfig:
     """Diagonal of W in d(q, q') = |W (q - q')|; None = identity."""
     proposals: int = 16
     """Proposals checked in one call. Any value gives the tree that 1 gives."""
+    margin: float = 0.004
+    """Clearance that a configuration needs to count as free [m]; covers tracking errors."""
     edge_resolution: float = 0.025
     """Longest gap between checked configurations of a motion [rad]."""
 
@@ -52,6 +54,8 @@ class RolloutConfig:
     """A predicted subgoal this near to the toggle [rad] becomes the toggle."""
     max_stuck: int = 2
     """Phases in a row without a motion after which an episode has failed."""
+    carry_speed: float = 0.6
+    """Factor on velocities (squared: on accelerations) while the gripper is closed."""
 
 
 @dataclass(frozen=True)

@@ -48,28 +48,30 @@ class MotionPlanner:
         self._trajectory_config = trajectory
 
         def config_free(worlds, problem, q):
-            return collision.config_free(scene, _rows(worlds, problem), q)
+            return collision.config_free(scene, _rows(worlds, problem), q, planner.margin)
 
         points = collision.points_for(planner.step_max, planner.edge_resolution)
 
         def motion_free(worlds, problem, q0, q1):
-            return collision.motion_free(scene, _rows(worlds, problem), q0, q1, points)
+            return collision.motion_free(scene, _rows(worlds, problem), q0, q1, points, planner.margin)
 
         self._config_free = jit(config_free)
         self._search = make_planner(motion_free, config_free, planner, limits.q_min, limits.q_max, jit)
 
-    def plan(self, worlds: World, q_start, q_goal, q_toggle, keys, draw=None, active=None) -> Motion:
+    def plan(self, worlds: World, q_start, q_goal, q_toggle, keys, draw=None, active=None, speed=None) -> Motion:
         """Searches, smooths and times P motions; see `make_planner` and `make_trajectory`.
 
-        The trajectory of a problem without a path stays at q_start.
+        The trajectory of a problem without a path stays at q_start. `speed` [P] is a factor on
+        each problem's velocity limits, and its square on the accelerations (1 if None).
         """
         start = time.perf_counter()
         result = jax.block_until_ready(self._search(worlds, q_start, q_goal, q_toggle, keys, draw, active))
         seconds = time.perf_counter() - start
         result = jax.tree.map(np.asarray, result)
+        speed = np.ones((len(result.path), 1)) if speed is None else np.reshape(speed, (-1, 1))
         trajectory = make_trajectory(
             result.path, result.path_length, keys, partial(self._config_free, worlds),
-            self.limits.velocity, self.limits.acceleration, self._trajectory_config,
+            speed * self.limits.velocity, speed**2 * self.limits.acceleration, self._trajectory_config,
         )  # fmt: skip
         return Motion(result, trajectory, seconds)
 

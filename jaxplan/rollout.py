@@ -151,7 +151,7 @@ def rollout(
         last = np.all(targets.q_goal == targets.q_toggle, axis=1) & (targets.gripper_toggle != task.closed[running])
         touching = touched.copy()
         touching[running] |= last
-        motion, segments = _plan(task, planner, propose, observation, targets, running, touching, seeds, number)
+        motion, segments = _plan(task, planner, propose, observation, targets, running, touching, seeds, number, config.carry_speed)
         status = motion.result.status
         executed = [e for e in running if motion.result.path_length[e] > 1 and motion.trajectory.rung[e] != Rung.INVALID]
         if listen is not None:
@@ -196,7 +196,7 @@ def _merge(targets: Targets, limits, distance: float) -> Targets:
     return Targets(q_toggle, np.array(targets.gripper_toggle), np.where(near[:, None], q_toggle, q_goal))
 
 
-def _plan(task, planner, propose, observation, targets, running, touching, seeds, number):
+def _plan(task, planner, propose, observation, targets, running, touching, seeds, number, carry_speed):
     """One batched search; lanes that are not running are padding, so that nothing recompiles."""
     lanes = task.batch
     q_start = np.zeros((lanes, observation.q.shape[1]), np.float32)
@@ -218,5 +218,6 @@ def _plan(task, planner, propose, observation, targets, running, touching, seeds
             segments = bank if segments is None else segments
             return bank
 
+    speed = np.where(task.closed, carry_speed, 1.0)
     worlds = task.worlds(touching)
-    return planner.plan(worlds, q_start, q_goal, q_toggle, keys, draw, active), segments
+    return planner.plan(worlds, q_start, q_goal, q_toggle, keys, draw, active, speed), segments

@@ -15,7 +15,7 @@ class GripperMotion(NamedTuple):
     """Finger commands [m]: they ramp, since a step topples or misses what it should grasp."""
 
     open: float = 0.04
-    closed: float = -0.02
+    closed: float = -0.035
     release: float = 0.010
     """A release opens each finger by this much; the rest follows once the hand is away."""
     speed: float = 0.05
@@ -39,6 +39,7 @@ class Simulator:
         self.data = [mujoco.MjData(model) for _ in range(batch)]
         self._steps = round(CONTROL_PERIOD / model.opt.timestep)
         self._pool = ThreadPoolExecutor(threads)
+        self._lag = -model.actuator_biasprm[:7, 2] / model.actuator_gainprm[:7, 0]
         self.record: Callable[[int, mujoco.MjData], None] | None = None
         """Called after each control period with (episode, data), from a worker thread."""
 
@@ -66,9 +67,12 @@ class Simulator:
         def run(job: tuple[int, np.ndarray]) -> None:
             episode, q = job
             data = self.data[episode]
-            for q_k in q:
-                data.ctrl[:7] = q_k
+            # Damping makes a position servo lag by kv / kp: the velocity is fed forward.
+            command = q + self._lag * np.gradient(q, CONTROL_PERIOD, axis=0) if len(q) > 1 else q
+            for command_k in command:
+                data.ctrl[:7] = command_k
                 self._advance(episode)
+            data.ctrl[:7] = q[-1]
             self._wait(episode, settle)
 
         list(self._pool.map(run, zip(episodes, trajectories, strict=True)))

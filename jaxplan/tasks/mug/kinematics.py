@@ -10,6 +10,9 @@ RETREAT = 0.10
 """How far the hand backs off along its own axis after a release [m]."""
 
 
+DAMPING = 1e-5 * np.eye(6)
+
+
 class InverseKinematics:
     """Joint angles that bring the tool centre point to a pose.
 
@@ -71,10 +74,11 @@ class InverseKinematics:
         mujoco.mj_comPos(self._model, self._data)
         mujoco.mj_jacSite(self._model, self._data, self._jacobian[:3], self._jacobian[3:], self._site)
         jacobian = self._jacobian[:, :7]
-        w = 0.5 * (np.cross(r[:, 0], rotation[:, 0]) + np.cross(r[:, 1], rotation[:, 1]) + np.cross(r[:, 2], rotation[:, 2]))
+        turn = rotation @ r.T
+        w = 0.5 * np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]])
         error = np.concatenate([position - p, w])
-        inverse = jacobian.T @ np.linalg.inv(jacobian @ jacobian.T + 1e-5 * np.eye(6))
         posture = 0.3 * (q_reference - q)
-        dq = inverse @ error + posture - inverse @ (jacobian @ posture)
+        damped = jacobian @ jacobian.T + DAMPING
+        dq = posture + jacobian.T @ np.linalg.solve(damped, error - jacobian @ posture)
         dq *= min(1.0, 0.3 / (np.abs(dq).max() + 1e-9))
-        return np.clip(q + dq, self._lower, self._upper), error
+        return np.minimum(np.maximum(q + dq, self._lower), self._upper), error
