@@ -47,13 +47,16 @@ def certify(
     places, rows = _densify(np.asarray(path, float), resolution)
     if not np.isfinite(rows).all():
         return Certificate(False, math.nan, None, math.nan, None)
-    best = Certificate(True, math.inf, None, 0.0, None)
-    answers = _nearest(scene, jax.tree.map(np.asarray, world), rows, reach=0.0)
-    for place, q, (distance, pair) in zip(places, rows, answers, strict=True):
-        if distance < best.clearance:
-            valid = bool(distance >= -tolerance)
-            best = Certificate(valid, distance, pair, float(place), q)
-    return best
+    answers = list(_nearest(scene, _rows(world, (len(rows),)), rows, reach=0.0))
+    distances = np.array([distance for distance, _ in answers])
+    worst = int(distances.argmin())
+    least = float(distances[worst])
+    if math.isinf(least):
+        return Certificate(True, least, None, math.nan, None)
+    pair = _names(scene, answers[worst][1])
+    return Certificate(
+        least >= -tolerance, least, pair, float(places[worst]), rows[worst]
+    )
 
 
 def closest_pair(
@@ -68,8 +71,8 @@ def closest_pair(
         reach: Pairs farther apart than this are not looked for [m]; (None, inf) then.
     """
     rows = np.asarray(q, float)[None]
-    distance, pair = next(_nearest(scene, jax.tree.map(np.asarray, world), rows, reach))
-    return pair, distance
+    distance, geoms = next(_nearest(scene, _rows(world, (1,)), rows, reach))
+    return _names(scene, geoms), distance
 
 
 def clearance_mujoco(
@@ -86,15 +89,7 @@ def clearance_mujoco(
     q = np.asarray(q, float)
     shape = batch_shape(world, q)
     rows = np.broadcast_to(q, (*shape, q.shape[-1])).reshape(-1, q.shape[-1])
-    worlds = World(
-        *(
-            np.broadcast_to(leaf, (*shape, *leaf.shape[leaf.ndim - own :])).reshape(
-                -1, *leaf.shape[leaf.ndim - own :]
-            )
-            for leaf, own in zip(map(np.asarray, world), (2, 1, 1, 1), strict=True)
-        )
-    )
-    answers = _nearest(scene, worlds, rows, reach)
+    answers = _nearest(scene, _rows(world, shape), rows, reach)
     return np.array([distance for distance, _ in answers]).reshape(shape)
 
 
@@ -121,65 +116,95 @@ def mujoco_model(scene: Scene, reach: float = 0.0) -> mujoco.MjModel:
     return model
 
 
-def set_state(
-    scene: Scene,
-    model: mujoco.MjModel,
-    data: mujoco.MjData,
-    world: World,
-    q: np.ndarray,
-) -> None:
-    """Puts one configuration into C MuJoCo and runs its kinematics and collision."""
-    for name, value in zip(scene.joints, q, strict=True):
-        data.qpos[model.joint(name).qposadr] = value
-    for name, value in zip(scene.passive, world.passive, strict=True):
-        data.qpos[model.joint(name).qposadr] = value
-    for name, pose in zip(scene.objects, world.object_pose, strict=True):
+def qpos_rows(scene: Scene, worlds: World, q: np.ndarray) -> np.ndarray:
+    """`[n, nq]` MuJoCo's joint positions; a held object's pose is still the hand's.
+
+    Args:
+        scene: The scene.
+        worlds: Leaves `[n, ...]`, NumPy.
+        q: `[n, d]` joints.
+    """
+    model = scene.mj_model
+    qpos = np.tile(np.asarray(scene.model.qpos0, float), (len(q), 1))
+    for names, values in ((scene.joints, q), (scene.passive, worlds.passive)):
+        columns = [int(model.joint(name).qposadr[0]) for name in names]
+        qpos[:, columns] = values
+    for index, name in enumerate(scene.objects):
         start = object_address(scene, name)
-        data.qpos[start : start + 7] = pose
-    mujoco.mj_kinematics(model, data)
-    if world.held.any():
-        hand = data.body(scene.hand)
-        for name, pose in zip(
-            np.array(scene.objects)[world.held],
-            world.object_pose[world.held],
-            strict=True,
-        ):
-            start = object_address(scene, name)
-            target = data.qpos[start : start + 7]
-            mujoco.mju_mulPose(
-                target[:3], target[3:], hand.xpos, hand.xquat, pose[:3], pose[3:]
-            )
-        mujoco.mj_kinematics(model, data)
-    mujoco.mj_collision(model, data)
+        qpos[:, start : start + 7] = worlds.object_pose[:, index]
+    return qpos
+
+
+def carry(scene: Scene, data: mujoco.MjData, held: np.ndarray) -> None:
+    """Turns held objects' poses from the hand's frame to the world, in `data.qpos`.
+
+    Args:
+        scene: The scene.
+        data: After `mj_kinematics`.
+        held: `[n_objects]` bool.
+    """
+    hand = data.body(scene.hand)
+    for name in np.array(scene.objects)[held]:
+        start = object_address(scene, name)
+        pose = data.qpos[start : start + 7]
+        mujoco.mju_mulPose(
+            pose[:3], pose[3:], hand.xpos, hand.xquat, pose[:3].copy(), pose[3:].copy()
+        )
 
 
 def _nearest(
     scene: Scene, worlds: World, rows: np.ndarray, reach: float
-) -> Iterator[tuple[float, tuple[str, str] | None]]:
-    """Least distance and its pair for each row; worlds have a row axis or none."""
+) -> Iterator[tuple[float, tuple[int, int] | None]]:
+    """Least distance of each row and its geoms.
+
+    Args:
+        scene: The scene.
+        worlds: Leaves `[n, ...]`, NumPy.
+        rows: `[n, d]` joints.
+        reach: How far pairs are looked for [m].
+    """
     model = mujoco_model(scene, reach)
     data = mujoco.MjData(model)
-    groups = scene.group_table()
-    shared = worlds.held.ndim == 1
-    for index, q in enumerate(rows):
-        world = worlds if shared else World(*(leaf[index] for leaf in worlds))
-        set_state(scene, model, data, world, q)
-        allowed = [
-            world.ignored[i] or (bool(g.held) and not world.held[list(g.held)].any())
-            for i, g in enumerate(scene.groups)
-        ]
-        # Contacts outside of all groups (a static body on another) get number -1.
-        allowed = np.array([*allowed, True])
-        geoms = data.contact.geom
+    table = scene.group_table()
+    # Contacts that are in no group (-1: a static body on another) count for nothing.
+    silent = np.pad(worlds.ignored, ((0, 0), (0, 1)), constant_values=True)
+    for index, group in enumerate(scene.groups):
+        if group.held:
+            silent[:, index] |= ~worlds.held[:, list(group.held)].any(-1)
+    qpos = qpos_rows(scene, worlds, rows)
+    for i in range(len(rows)):
+        data.qpos[:] = qpos[i]
+        mujoco.mj_kinematics(model, data)
+        if worlds.held[i].any():
+            carry(scene, data, worlds.held[i])
+            mujoco.mj_kinematics(model, data)
+        mujoco.mj_collision(model, data)
+        geoms, distance = data.contact.geom, data.contact.dist
         distance = np.where(
-            allowed[groups[geoms[:, 0], geoms[:, 1]]], np.inf, data.contact.dist
+            silent[i, table[geoms[:, 0], geoms[:, 1]]], np.inf, distance
         )
-        if not np.isfinite(distance).any():
+        deepest = distance.argmin() if data.ncon else -1
+        if data.ncon and np.isfinite(distance[deepest]):
+            yield (
+                float(distance[deepest]),
+                (int(geoms[deepest, 0]), int(geoms[deepest, 1])),
+            )
+        else:
             yield math.inf, None
-            continue
-        deepest = distance.argmin()
-        first, second = (scene.geom_name(int(g)) for g in geoms[deepest])
-        yield float(distance[deepest]), (first, second)
+
+
+def _names(scene: Scene, geoms: tuple[int, int] | None) -> tuple[str, str] | None:
+    return geoms and (scene.geom_name(geoms[0]), scene.geom_name(geoms[1]))
+
+
+def _rows(world: World, shape: tuple[int, ...]) -> World:
+    """The world's leaves as `[n, ...]` NumPy arrays, n = size of the shape."""
+
+    def one(leaf: jax.Array, own: int) -> np.ndarray:
+        tail = leaf.shape[leaf.ndim - own :]
+        return np.broadcast_to(np.asarray(leaf), (*shape, *tail)).reshape(-1, *tail)
+
+    return World(*(one(*pair) for pair in zip(world, (2, 1, 1, 1), strict=True)))
 
 
 def _densify(path: np.ndarray, resolution: float) -> tuple[np.ndarray, np.ndarray]:
