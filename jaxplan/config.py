@@ -207,6 +207,8 @@ class TrainConfig:
     """Directories of demonstrations."""
     out: str | None = None
     """Where the weights are exported when training ends; None = in the run's directory."""
+    init: str | None = None
+    """Directory of weights to start from, as after new demonstrations; None = fresh ones."""
     seed: int = 0
     steps: int = 100_000
     batch_size: int = 64

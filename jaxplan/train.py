@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 import tyro
 
@@ -100,7 +101,8 @@ def train_predictor(config: PredictorTraining) -> Path:
     state, metrics = learning.fit(
         config,
         RUNS / config.name,
-        predictor.init(config.network, key, gather(rows[:1])),
+        _initial(config, "predictor")
+        or predictor.init(config.network, key, gather(rows[:1])),
         partial(predictor.loss, config),
         rows,
         gather,
@@ -126,7 +128,8 @@ def train_sampler(config: SamplerTraining) -> Path:
     state, metrics = learning.fit(
         config,
         RUNS / config.name,
-        sampler.init(config.network, key, gather(rows[:1])),
+        _initial(config, "sampler")
+        or sampler.init(config.network, key, gather(rows[:1])),
         partial(sampler.loss, config),
         rows,
         gather,
@@ -153,6 +156,16 @@ def _split(rows: np.ndarray, held: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
             f"{len(train)} frames to train on and {len(val)} held out: collect more episodes"
         )
     return train, val
+
+
+def _initial(config: Training, kind: str) -> dict | None:
+    """The weights that `config.init` names, if it does."""
+    if config.init is None:
+        return None
+    weights = learning.load_weights(kind, config.init)
+    if weights.config != config.network:
+        raise UsageError(f"{config.init} holds a {kind} with other --network settings")
+    return jax.tree.map(jnp.asarray, weights.params)
 
 
 def _export(

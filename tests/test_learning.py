@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+import runpy
 import subprocess
 import sys
 from pathlib import Path
@@ -21,7 +22,15 @@ from jaxplan.config import (
     SamplerTraining,
     from_dict,
 )
-from jaxplan.learning import augment, checkpoint, loop, losses, pretrained, segments
+from jaxplan.learning import (
+    augment,
+    checkpoint,
+    loop,
+    losses,
+    predictor,
+    pretrained,
+    segments,
+)
 from jaxplan.learning.train_state import ema_decay, init_state, optimizer
 from jaxplan.networks import Prediction
 
@@ -342,10 +351,10 @@ def test_the_door_trains_both_networks(demos, tmp_path, monkeypatch):
     ]
     for kind, extra in (("predictor", []), ("sampler", ["--predictor", "weights"])):
         assert train.main([kind, *common, *extra]) == 0
-    predictor, sampler = learning.load_pair("weights")
-    assert predictor.config.hidden == 32
-    assert sampler.info["predictor_sha256"] == predictor.info["sha256"]
-    assert demos in predictor.info["data"]
+    upper, lower = learning.load_pair("weights")
+    assert upper.config.hidden == 32
+    assert lower.info["predictor_sha256"] == upper.info["sha256"]
+    assert demos in upper.info["data"]
     before = Path("weights/predictor.npz").read_bytes()
     assert train.main(["predictor", *common]) == 0
     assert Path("weights/predictor.npz").read_bytes() == before
@@ -413,3 +422,20 @@ def test_killed_process_resumes(demos, tmp_path):
         outputs.append(jax.tree.leaves(weights.params))
     for a, b in zip(*outputs, strict=True):
         np.testing.assert_allclose(a, b, atol=1e-6)
+
+
+def test_training_starts_from_given_weights(demos, tmp_path, monkeypatch):
+    """With a learning rate of zero, what comes out is what went in."""
+    monkeypatch.chdir(tmp_path)
+    config = runpy.run_path(str(CONFIGS / "debug.py"))["predictor"].network
+    frames = predictor.gather(demonstrations(), np.arange(1))
+    params = predictor.init(config, jax.random.key(5), frames)
+    learning.save_weights("first", "predictor", params, config, {})
+    command = ["predictor", "--config", str(CONFIGS / "debug.py"), "--data", demos]
+    still = ["--steps", "1", "--optimizer.learning-rate", "0", "--init", "first"]
+    assert train.main([*command, *still, "--out", "second"]) == 0
+    second = learning.load_weights("predictor", "second").params
+    for a, b in zip(jax.tree.leaves(params), jax.tree.leaves(second), strict=True):
+        np.testing.assert_allclose(a, b, atol=1e-6)
+    other = [*still, "--network.hidden", "16", "--name", "other"]
+    assert train.main([*command, *other]) == 2
