@@ -38,7 +38,10 @@ class PlannerConfig:
     metric: tuple[float, ...] | None = None
     """Diagonal of W in d(q, q') = |W (q - q')|; None = identity."""
     proposals: int = 16
-    """Proposals checked in one call. Any value gives the tree that 1 gives."""
+    """Most proposals of a problem in one collision call. Any value gives the tree that 1 gives."""
+    check_rows: int = 256
+    """Motions of one collision call, or one for each problem where that is more. While many
+    problems search, each puts in fewer proposals. More pays on a GPU; the trees are the same."""
     margin: float = 0.004
     """Clearance that a configuration needs to count as free [m]; covers tracking errors."""
     edge_resolution: float = 0.025
@@ -64,8 +67,8 @@ class DemonstrationConfig:
 
     noisy_episodes: float = 0.5
     """Share of episodes whose keyframes are driven to with noise."""
-    keyframe_noise: float = 0.03
-    toggle_noise: float = 0.006
+    keyframe_noise: float = 0.015
+    toggle_noise: float = 0.004
     frame_noise: float = 0.03
     """Of the arms from which the camera looks beside the phase's start."""
     perturbed_first: int = 2

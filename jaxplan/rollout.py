@@ -153,10 +153,10 @@ def rollout(
         touching[running] |= last
         motion, segments = _plan(task, planner, propose, observation, targets, running, touching, seeds, number, config.carry_speed)
         status = motion.result.status
-        executed = [e for e in running if motion.result.path_length[e] > 1 and motion.trajectory.rung[e] != Rung.INVALID]
+        executed = [e for e in running if len(motion.q[e]) > 1]
         if listen is not None:
             listen(Phase(number, running, observation, targets, segments, motion, executed))
-        task.follow(executed, [motion.trajectory.q[e, : motion.trajectory.length[e]] for e in executed])
+        task.follow(executed, [motion.q[e] for e in executed])
         at_toggle = [
             (e, bool(targets.gripper_toggle[row])) for row, e in enumerate(running)
             if last[row] and task.arrived(e, targets.q_toggle[row])
@@ -171,14 +171,14 @@ def rollout(
             phases[e].append(PhaseRecord(
                 task.sim.q(e).tolist(), targets.q_goal[row].tolist(), targets.q_toggle[row].tolist(),
                 int(targets.gripper_toggle[row]), e in toggled, Status(status[e]).name, int(motion.result.expansions[e]),
-                motion.seconds / len(running), Rung(motion.trajectory.rung[e]).name if moved else "NONE",
+                motion.seconds / len(running), Rung(motion.rung[e]).name if moved else "NONE",
             ))  # fmt: skip
         for e in list(running):
             if e in leaving and e in executed:
                 finished.append(e)
                 running.remove(e)
             elif stuck[e] >= config.max_stuck:
-                failures[e] = f"no motion in phase {number + 1}: {phases[e][-1].status}, {phases[e][-1].smoothing}"
+                failures[e] = f"no motion in phase {number + 1}: {phases[e][-1].status}, " + _obstacle(planner, task, touching, e, phases[e][-1])
                 running.remove(e)
     for e in running:
         failures[e] = f"not finished after {config.max_phases} phases"
@@ -186,6 +186,13 @@ def rollout(
     for e in finished:
         failures[e] = task.failure(e)
     return [EpisodeRecord(int(seeds[e]), failures[e] is None, failures[e], phases[e]) for e in lanes]
+
+
+def _obstacle(planner: MotionPlanner, task: Task, touching: np.ndarray, episode: int, phase: PhaseRecord) -> str:
+    """What is in the way at the phase's start and goal."""
+    worlds = task.worlds(touching)
+    at_start = planner.reason(worlds, episode, phase.q_start)
+    return f"at its start {at_start}; at its goal {planner.reason(worlds, episode, phase.subgoal)}"
 
 
 def _merge(targets: Targets, limits, distance: float) -> Targets:

@@ -86,8 +86,7 @@ class Recorder:
         for row, e in enumerate(phase.episodes):
             if e not in phase.executed or self._task.in_terminal_region(e):
                 continue
-            trajectory = phase.motion.trajectory
-            q = trajectory.q[e, : trajectory.length[e]]
+            q = phase.motion.q[e]
             observation = Observation(*(column[row : row + 1] for column in phase.observation))
             self._keep(e, observation, q)
             first = self._policy.toggle(e) == Toggle.GRASP1
