@@ -99,6 +99,7 @@ def mujoco_model(scene: Scene, reach: float = 0.0) -> mujoco.MjModel:
     fields = "geom_pos geom_quat geom_size body_pos body_quat jnt_pos jnt_axis qpos0"
     for field in fields.split():
         getattr(model, field)[:] = np.asarray(getattr(scene.model, field))
+    model.geom_sameframe[:] = mujoco.mjtSameFrame.mjSAMEFRAME_NONE
     # Bounds of the broad phase follow from the sizes; the tree of bounds in a body does
     # not follow at all, so it is left out.
     half = model.geom_size.copy()
@@ -202,7 +203,8 @@ def _rows(world: World, shape: tuple[int, ...]) -> World:
 
     def one(leaf: jax.Array, own: int) -> np.ndarray:
         tail = leaf.shape[leaf.ndim - own :]
-        return np.broadcast_to(np.asarray(leaf), (*shape, *tail)).reshape(-1, *tail)
+        rows = np.broadcast_to(np.asarray(leaf), (*shape, *tail))
+        return rows.reshape(math.prod(shape), *tail)
 
     return World(*(one(*pair) for pair in zip(world, (2, 1, 1, 1), strict=True)))
 

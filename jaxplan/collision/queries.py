@@ -125,5 +125,5 @@ def _batch_last(leaf: jax.Array, shape: tuple[int, ...], own: int) -> jax.Array:
     tail = leaf.shape[leaf.ndim - own :]
     if math.prod(leaf.shape[: leaf.ndim - own]) == 1:
         return leaf.reshape(*tail, 1)
-    rows = jnp.broadcast_to(leaf, (*shape, *tail)).reshape(-1, *tail)
+    rows = jnp.broadcast_to(leaf, (*shape, *tail)).reshape(math.prod(shape), *tail)
     return jnp.moveaxis(rows, 0, -1)
