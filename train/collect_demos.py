@@ -5,19 +5,18 @@ again; a finished collection has a manifest with the checksum of each.
 """
 
 import dataclasses
+import multiprocessing
+import os
 import sys
-from dataclasses import dataclass
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import tyro
 from tqdm import tqdm
 
-from jaxplan import config, data
-from jaxplan.motion import MotionPlanner
-from jaxplan.rollout import Targets, rollout
-from jaxplan.scene.panda import PANDA_LIMITS
-from jaxplan.tasks.mug.demonstrate import ExpertPolicy, Recorder
-from jaxplan.tasks.mug.task import MugTask
+from jaxplan import data
+from jaxplan.config import DemonstrationConfig, PlannerConfig, RolloutConfig
 
 
 @dataclass(frozen=True)
@@ -30,13 +29,59 @@ class Args:
     shard_size: int = 32
     """Episodes a shard; one batch in lockstep."""
     camera: str = "hand"
-    demonstration: config.DemonstrationConfig = config.DemonstrationConfig()
+    workers: int = field(default_factory=lambda: os.cpu_count() or 1)
+    """Processes, each making one shard at a time. The bytes do not depend on it."""
+    demonstration: DemonstrationConfig = DemonstrationConfig()
+
+
+class Collector:
+    """Makes shards in a process of its own."""
+
+    def __init__(self, args: Args) -> None:
+        from jaxplan.motion import MotionPlanner
+        from jaxplan.scene.panda import PANDA_LIMITS
+        from jaxplan.tasks.mug.demonstrate import ExpertPolicy
+        from jaxplan.tasks.mug.task import MugTask
+
+        self._args = args
+        self._task = MugTask(args.shard_size, args.camera)
+        planner = PlannerConfig(p_uniform=1.0)
+        self._planner = MotionPlanner(self._task.planning_scene, PANDA_LIMITS, planner)
+        self._policy = ExpertPolicy(self._task, args.demonstration)
+
+    def shard(self, index: int) -> tuple[int, int]:
+        """Makes and writes shard `index`; returns how many of its episodes succeeded, and their number."""
+        from jaxplan.rollout import Targets, rollout
+        from jaxplan.tasks.mug.demonstrate import Recorder
+
+        args, policy = self._args, self._policy
+        seeds = range(args.first_seed + index * args.shard_size, args.first_seed + (index + 1) * args.shard_size)
+        policy.reset(seeds)
+        recorder = Recorder(self._task, policy, seeds, args.demonstration)
+        records = rollout(
+            self._task, seeds, lambda o, e: Targets(*policy(o, e)), self._planner, None, RolloutConfig(), recorder
+        )
+        data.write_shard(data.shard_path(args.out, index), recorder.shard(records))
+        return sum(record.success for record in records), len(records)
+
+
+_collector: Collector | None = None
+
+
+def _start(args: Args) -> None:
+    global _collector
+    _collector = Collector(args)
+
+
+def _shard(index: int) -> tuple[int, int]:
+    assert _collector is not None
+    return _collector.shard(index)
 
 
 def main(args: Args) -> None:
     """Collects what is missing."""
-    if args.episodes < 1 or args.shard_size < 1:
-        raise ValueError(f"nothing to collect: episodes {args.episodes}, shard_size {args.shard_size}")
+    if args.episodes < 1 or args.shard_size < 1 or args.workers < 1:
+        raise ValueError(f"nothing to do: {args.episodes} episodes, {args.shard_size} a shard, {args.workers} workers")
     count = -(-args.episodes // args.shard_size)
     settings = {
         "task": "mug", "first_seed": args.first_seed, "shard_size": args.shard_size, "camera": args.camera,
@@ -44,21 +89,22 @@ def main(args: Args) -> None:
     }  # fmt: skip
     args.out.mkdir(parents=True, exist_ok=True)
     missing = data.missing_shards(args.out, count, settings)
-    if missing:
+    if not missing:
         data.write_manifest(args.out, settings)
-        task = MugTask(args.shard_size, args.camera)
-        planner = MotionPlanner(task.planning_scene, PANDA_LIMITS, config.PlannerConfig(p_uniform=1.0))
-        policy = ExpertPolicy(task, args.demonstration)
-    done = solved = 0
-    bar = tqdm(missing, unit="shard")
-    for index in bar:
-        seeds = [args.first_seed + index * args.shard_size + k for k in range(args.shard_size)]
-        policy.reset(seeds)
-        recorder = Recorder(task, policy, seeds, args.demonstration)
-        records = rollout(task, seeds, lambda o, e: Targets(*policy(o, e)), planner, listen=recorder)
-        data.write_shard(data.shard_path(args.out, index), recorder.shard(records))
-        done, solved = done + len(seeds), solved + sum(record.success for record in records)
-        bar.set_postfix_str(f"{solved}/{done} episodes solved, {done / bar.format_dict['elapsed']:.2f} episodes/s")
+        return
+    data.write_manifest(args.out, settings)
+    spawn = multiprocessing.get_context("spawn")
+    workers = min(args.workers, len(missing))
+    solved = made = 0
+    with (
+        ProcessPoolExecutor(workers, spawn, initializer=_start, initargs=(args,)) as pool,
+        tqdm(total=len(missing) * args.shard_size, unit="episode") as bar,
+    ):
+        for done in as_completed([pool.submit(_shard, index) for index in missing]):
+            successes, episodes = done.result()
+            solved, made = solved + successes, made + episodes
+            bar.update(episodes)
+            bar.set_postfix_str(f"{solved}/{made} succeeded")
     data.write_manifest(args.out, settings)
 
 
@@ -66,4 +112,5 @@ if __name__ == "__main__":
     try:
         main(tyro.cli(Args))
     except (ValueError, RuntimeError) as error:
-        sys.exit(f"error: {error}") if False else (print(f"error: {error}", file=sys.stderr), sys.exit(2))
+        print(f"error: {error}", file=sys.stderr)
+        sys.exit(2)
