@@ -17,6 +17,7 @@ from jaxplan.networks import (
     resnet,
     unet1d,
 )
+from jaxplan.networks.mish import mish
 
 TINY = EncoderConfig(stem="patch4", width=4, blocks=(1, 1), keypoints=4, features=8)
 
@@ -188,3 +189,10 @@ def test_joints_round_trip():
     q = jnp.linspace(-0.06, -0.05, 7)
     back = joints.unnormalize(joints.normalize(q, *limits), *limits)
     np.testing.assert_allclose(back, q, atol=1e-6)
+
+
+def test_mish_equals_its_definition():
+    x = jnp.concatenate([jnp.linspace(-30, 30, 601), jnp.array([-1e4, 1e4])])
+    np.testing.assert_allclose(mish(x), jax.nn.mish(x), atol=1e-5)
+    slope, expected = (jax.vmap(jax.grad(f))(x) for f in (mish, jax.nn.mish))
+    np.testing.assert_allclose(slope, expected, atol=1e-5)

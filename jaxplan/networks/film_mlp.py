@@ -4,6 +4,8 @@ import flax.linen as nn
 import jax
 import jax.numpy as jnp
 
+from jaxplan.networks.mish import mish
+
 
 class FilmMlp(nn.Module):
     """Residual MLP blocks, each modulated by (1 + scale) and a shift.
@@ -26,7 +28,7 @@ class FilmMlp(nn.Module):
         for width, film in zip(self.hidden, films, strict=True):
             scale, shift = jnp.split(film, 2, axis=-1)
             r = nn.Dense(width)(nn.LayerNorm()(h))
-            r = jax.nn.mish((1.0 + scale) * r + shift)
+            r = mish((1.0 + scale) * r + shift)
             h = (h if h.shape[-1] == width else nn.Dense(width)(h)) + nn.Dense(width)(r)
-        h = jax.nn.mish(nn.LayerNorm()(h))
+        h = mish(nn.LayerNorm()(h))
         return nn.Dense(self.outputs, kernel_init=nn.initializers.zeros)(h)

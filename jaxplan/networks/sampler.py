@@ -13,6 +13,7 @@ import jax.numpy as jnp
 from jaxplan.config import SamplerConfig
 from jaxplan.networks.film_mlp import FilmMlp
 from jaxplan.networks.joints import normalize
+from jaxplan.networks.mish import mish
 from jaxplan.networks.predictor import state_vector
 from jaxplan.networks.resnet import Encoder
 from jaxplan.networks.unet1d import ConditionalUnet1D
@@ -78,7 +79,7 @@ class SamplerNetwork(nn.Module):
         step = self.step(sinusoidal(t, self.config.step_features))
         batch = jnp.broadcast_shapes(step.shape[:-1], cond.shape[:-1])
         both = [jnp.broadcast_to(v, (*batch, v.shape[-1])) for v in (step, cond)]
-        return self.modulation(jax.nn.mish(jnp.concatenate(both, axis=-1)))
+        return self.modulation(mish(jnp.concatenate(both, axis=-1)))
 
     def denoise(self, x_t: jax.Array, film: jax.Array) -> jax.Array:
         """eps for x_t [..., 8], with film broadcastable to [..., F]."""
@@ -100,4 +101,4 @@ def sinusoidal(t: jax.Array, features: int) -> jax.Array:
 
 
 def _mlp(hidden: int, outputs: int) -> nn.Sequential:
-    return nn.Sequential([nn.Dense(hidden), jax.nn.mish, nn.Dense(outputs)])
+    return nn.Sequential([nn.Dense(hidden), mish, nn.Dense(outputs)])

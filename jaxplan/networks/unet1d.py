@@ -8,6 +8,8 @@ import flax.linen as nn
 import jax
 import jax.numpy as jnp
 
+from jaxplan.networks.mish import mish
+
 
 class ConditionalUnet1D(nn.Module):
     """Diffusion Policy's U-Net; its length (8) must divide by 2^(levels - 1).
@@ -74,9 +76,7 @@ class ConvBlock(nn.Module):
         h = Conv1d(self.channels, self.kernel)(h)
         batch = h.shape[:-2]
         norm = nn.GroupNorm(8, epsilon=1e-5)
-        return jax.nn.mish(norm(h.reshape(-1, *h.shape[-2:]))).reshape(
-            *batch, *h.shape[-2:]
-        )
+        return mish(norm(h.reshape(-1, *h.shape[-2:]))).reshape(*batch, *h.shape[-2:])
 
 
 class Conv1d(nn.Module):
