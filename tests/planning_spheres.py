@@ -23,16 +23,17 @@ class Spheres(NamedTuple):
 
 
 def config_free(worlds, problem, q):
+    """Of NumPy and of JAX arrays alike."""
     gap = q[:, None] - worlds.centre[problem]
-    return (jnp.linalg.norm(gap, axis=-1) > worlds.radius[problem]).all(-1)
+    return ((gap**2).sum(-1) > worlds.radius[problem] ** 2).all(-1)
 
 
 def motion_free(worlds, problem, q0, q1):
+    """Of NumPy and of JAX arrays alike, by the point of the motion nearest to a centre."""
     centre, edge = worlds.centre[problem], (q1 - q0)[:, None]
     along = ((centre - q0[:, None]) * edge).sum(-1) / (edge**2).sum(-1).clip(1e-12)
     nearest = q0[:, None] + along.clip(0, 1)[..., None] * edge
-    gap = jnp.linalg.norm(centre - nearest, axis=-1)
-    return (gap > worlds.radius[problem]).all(-1)
+    return (((centre - nearest) ** 2).sum(-1) > worlds.radius[problem] ** 2).all(-1)
 
 
 def problems(count, d=7, spheres=12, seed=0):
@@ -79,10 +80,10 @@ class Oracle:
 
     def __init__(self, world, q_start, q_goal, q_toggle, key, segments, config):
         d = q_start.size
-        k = jnp.arange(config.max_expansions)[:, None]
+        k = jnp.arange(config.max_expansions)
         limits = jnp.full(d, -Q_MAX), jnp.full(d, Q_MAX)
-        numbers = jax.jit(draw_numbers, static_argnums=4)(key[None], k, *limits, config)
-        self.draws = jax.tree.map(lambda x: np.asarray(x)[:, 0], numbers)
+        numbers = draw_numbers(jnp.broadcast_to(key, k.shape), k, limits, config)
+        self.draws = jax.tree.map(np.asarray, numbers)
         self.world, self.segments, self.config = world, segments, config
         self.q_start, self.q_goal, self.q_toggle = q_start, q_goal, q_toggle
         self.q, self.parent, self.side = [q_start], [-1], [0]
@@ -108,8 +109,8 @@ class Oracle:
         edge = q1 - q0
         along = (self.world.centre - q0) @ edge / max(edge @ edge, 1e-12)
         nearest = q0 + np.clip(along, 0, 1)[:, None] * edge
-        gap = np.linalg.norm(self.world.centre - nearest, axis=-1)
-        return bool((gap > self.world.radius).all())
+        gap = ((self.world.centre - nearest) ** 2).sum(-1)
+        return bool((gap > self.world.radius**2).all())
 
     def move(self, base, side, target, length, direction=None):
         """Tries one motion; returns the new node (None: rejected) and if it is target."""

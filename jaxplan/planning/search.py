@@ -4,7 +4,8 @@ An algorithm (`rrt`, `rrt_connect`) is a machine with discrete control. From its
 proposes one move; the verdict on that move gives the next control. A round takes K moves:
 
     speculate  runs the machine K moves ahead as if every motion were free; no collision calls
-    check      all P x K motions in one call
+    check      the motions of all P problems in one call of `check_rows` rows. K is what
+               fits: 1 while many problems search, up to `proposals` for the last few
     settle     commits moves in order, as long as the machine alone would have made them:
                every earlier move was committed; the base is not a rejected node; and the
                move before was either free, as assumed, or its verdict changes nothing that
@@ -25,11 +26,10 @@ import jax.numpy as jnp
 
 from jaxplan.config import PlannerConfig
 from jaxplan.planning import rrt, rrt_connect
-from jaxplan.planning.proposal import Draw, draw_numbers
 from jaxplan.planning.result import PlanResult, Status
-from jaxplan.planning.segment import Segment
+from jaxplan.planning.segment import Limits, Segment
 from jaxplan.planning.speculation import settle, speculate
-from jaxplan.planning.state import Limits, Query, State, searching
+from jaxplan.planning.state import Query, State, searching
 from jaxplan.planning.tree import extract_path, plant
 
 METHODS = {"rrt": rrt, "rrt_connect": rrt_connect}
@@ -87,6 +87,7 @@ def start(
         tree=plant(method.roots(query), config.max_expansions + 2),
         control=control,
         status=status,
+        waiting=jnp.zeros_like(active),
         expansions=jnp.zeros_like(lane),
         accepted=jnp.zeros_like(lane),
         checked=jnp.zeros_like(lane),
@@ -107,7 +108,7 @@ def grow(
         state: From `start` or an earlier `grow`.
         bank: `[P, M]` segments, of each problem those from `chunk * M` on, with
             `chunk = state.control.used // M`. None: uniform proposals only.
-        motion_free: `(problem [R], q0 [R, d], q1 [R, d]) -> [R]`, with R = P x proposals.
+        motion_free: `(problem [R], q0 [R, d], q1 [R, d]) -> [R]`.
         limits: `(q_min [d], q_max [d])` [rad].
         config: Planner settings.
 
@@ -115,35 +116,33 @@ def grow(
         The state; problems that wait are those still `searching`.
     """
     method = METHODS[config.method]
-    rows = 0 if bank is None else bank.length.shape[1]
-    first = state.control.used // max(rows, 1) * rows
     lane = jnp.arange(state.status.size, dtype=jnp.int32)
-
-    def numbers(state: State, count: int) -> Draw:
-        expansion = state.expansions + jnp.arange(count, dtype=jnp.int32)[:, None]
-        return draw_numbers(state.query.key, expansion, *limits, config)
+    ahead = lane.size * config.proposals
+    room = max(lane.size, min(ahead, config.check_rows))
+    first = state.control.used if bank is None else _chunk_start(state, bank)
 
     def able(state: State) -> jax.Array:
-        ready = searching(state, config)
-        if bank is None:
-            return ready
-        draw = jax.tree.map(lambda x: x[0], numbers(state, 1))
-        asking = method.asks(state.control, draw, config)
-        return ready & ~(asking & (state.control.used >= first + rows))
+        return searching(state, config) & ~state.waiting
 
     def round_(state: State) -> State:
-        draws = numbers(state, config.proposals)
-        trial = speculate(method, state, bank, first, draws, limits, config)
-        # a motion that nobody asks about stands still at the start, which is known free
-        asked = (trial.running & trial.possible)[..., None]
-        q0 = jnp.where(asked, trial.q_base, state.query.q_start)
-        q1 = jnp.where(asked, trial.q_new, state.query.q_start)
-        d = q0.shape[-1]
-        problem = jnp.tile(lane, config.proposals)
-        free = motion_free(problem, q0.reshape(-1, d), q1.reshape(-1, d))
-        return settle(method, state, trial, free.reshape(asked.shape[:2]), config)
+        depth = room // jnp.maximum(jnp.sum(able(state)), 1)
+        depth = jnp.minimum(depth, config.proposals)
+        trial = speculate(method, state, bank, first, depth, limits, config)
+        asked = (trial.running & trial.possible).reshape(ahead)
+        (rows,) = jnp.nonzero(asked, size=room, fill_value=0)
+        q0, q1 = (q.reshape(ahead, -1)[rows] for q in (trial.q_base, trial.q_new))
+        verdict = motion_free(rows % lane.size, q0, q1)
+        free = asked & verdict[jnp.clip(jnp.cumsum(asked) - 1, 0)]
+        return settle(method, state, trial, free.reshape(trial.running.shape), config)
 
+    state = state._replace(waiting=jnp.zeros_like(state.waiting))
     return jax.lax.while_loop(lambda s: jnp.any(able(s)), round_, state)
+
+
+def _chunk_start(state: State, bank: Segment) -> jax.Array:
+    """`[P]` number of the first segment in the bank."""
+    rows = bank.length.shape[1]
+    return state.control.used // rows * rows
 
 
 def finish(state: State, config: PlannerConfig) -> PlanResult:

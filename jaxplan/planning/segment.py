@@ -19,6 +19,9 @@ SNAP = 1.0001
 """A target this share of a step away is reached: without it, a straight motion of a whole
 number of steps would end on the rounding of its last step."""
 
+Limits = tuple[jax.Array, jax.Array]
+"""`(q_min [d], q_max [d])` [rad]."""
+
 
 class Segment(NamedTuple):
     """Direction u and step length s of a tree extension (section 4.3)."""
@@ -49,15 +52,14 @@ def usable(segment: Segment) -> jax.Array:
 
 
 def extend(
-    q_base: jax.Array, proposal: Proposal, q_min: jax.Array, q_max: jax.Array
+    q_base: jax.Array, proposal: Proposal, limits: Limits
 ) -> tuple[jax.Array, jax.Array]:
     """Carries out a proposal from its base (equation 4, with the projection to limits).
 
     Args:
         q_base: `[P, d]` [rad].
         proposal: Moves, one for each row of `q_base`.
-        q_min: `[d]` lower joint limits [rad].
-        q_max: `[d]` upper joint limits [rad].
+        limits: Of the joints [rad].
 
     Returns:
         `q_new [P, d]`, and `reached [P]`: whether it is the target, to the last bit.
@@ -67,5 +69,5 @@ def extend(
     reached = proposal.toward & (distance <= SNAP * proposal.length)
     straight = gap / jnp.maximum(distance, 1e-9)[:, None]
     direction = jnp.where(proposal.toward[:, None], straight, proposal.direction)
-    q_new = jnp.clip(q_base + proposal.length[:, None] * direction, q_min, q_max)
+    q_new = jnp.clip(q_base + proposal.length[:, None] * direction, *limits)
     return jnp.where(reached[:, None], proposal.target, q_new), reached

