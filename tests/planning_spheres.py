@@ -3,6 +3,7 @@
 Motions are checked in closed form; the planner is plain NumPy, one problem at a time.
 """
 
+from functools import partial
 from typing import NamedTuple
 
 import jax
@@ -57,22 +58,26 @@ def problems(count, d=7, spheres=12, seed=0):
     return worlds, q_start.astype(np.float32), q_goal.astype(np.float32), keys
 
 
-def noisy_sampler(q_start, q_goal, keys, rows=8, noise=0.7):
+def noisy_sampler(q_start, q_goal, keys, rows=8):
     """Segments roughly from start to goal; segment j depends on the key and j alone."""
-    straight = (q_goal - q_start) / np.linalg.norm(q_goal - q_start, axis=-1)[:, None]
+    return lambda chunk: _noisy_segments(q_start, q_goal, keys, chunk, rows)
 
-    @jax.jit
-    def draw(chunk):
-        def one(key, j):
-            key = jax.random.fold_in(jax.random.fold_in(key, 7), j)
-            return jax.random.normal(key, (straight.shape[1] + 1,))
 
-        index = chunk[:, None] * rows + jnp.arange(rows)
-        z = jax.vmap(jax.vmap(one, (None, 0)))(keys, index)
-        scale = noise / np.sqrt(straight.shape[1])
-        return Segment(straight[:, None] + scale * z[..., 1:], 0.15 + 0.1 * z[..., 0])
+@partial(jax.jit, static_argnums=4)
+def _noisy_segments(q_start, q_goal, keys, chunk, rows):
+    d = q_start.shape[1]
 
-    return draw
+    def one(key, j):
+        key = jax.random.fold_in(jax.random.fold_in(key, 7), j)
+        return jax.random.uniform(key, (d + 1,), minval=-1, maxval=1)
+
+    index = chunk[:, None] * rows + jnp.arange(rows)
+    noise = jax.vmap(jax.vmap(one, (None, 0)))(keys, index)
+    gap = q_goal - q_start
+    straight = gap / jnp.linalg.norm(gap, axis=-1, keepdims=True)
+    return Segment(
+        straight[:, None] + 0.5 * noise[..., 1:], 0.15 + 0.15 * noise[..., 0]
+    )
 
 
 class Oracle:
