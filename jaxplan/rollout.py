@@ -39,12 +39,15 @@ class Task(Protocol):
     def in_range(self, episode: int) -> bool: ...
     def observe(self, episodes: Sequence[int]) -> Any: ...
     def worlds(self, touching: np.ndarray) -> World: ...
-    def follow(self, episodes: Sequence[int], trajectories: Sequence[np.ndarray]) -> None: ...
+    def follow(
+        self, episodes: Sequence[int], trajectories: Sequence[np.ndarray]
+    ) -> None: ...
     def toggle(self, episodes: Sequence[int], close: Sequence[bool]) -> None: ...
     def widen(self, episodes: Sequence[int]) -> None: ...
     def wait(self, episodes: Sequence[int], seconds: float) -> None: ...
     def in_terminal_region(self, episode: int) -> bool: ...
     def retreat(self, episode: int) -> np.ndarray: ...
+    def arrived(self, episode: int, q: np.ndarray) -> bool: ...
     def failure(self, episode: int) -> str | None: ...
 
 
@@ -131,7 +134,10 @@ def rollout(
     lanes = list(range(len(seeds)))
     task.reset(lanes, seeds)
     phases: list[list[PhaseRecord]] = [[] for _ in lanes]
-    failures: list[str | None] = [None if task.in_range(e) else "the mug came to rest outside the range" for e in lanes]
+    failures: list[str | None] = [
+        None if task.in_range(e) else "the mug came to rest outside the range"
+        for e in lanes
+    ]
     running = [e for e in lanes if failures[e] is None]
     finished: list[int] = []
     stuck = np.zeros(len(lanes), int)
@@ -142,20 +148,37 @@ def rollout(
             break
         leaving = [e for e in running if task.in_terminal_region(e)]
         observation = task.observe(running)
-        targets = _merge(predict(observation, running), planner.limits, config.merge_distance)
+        targets = _merge(
+            predict(observation, running), planner.limits, config.merge_distance
+        )
         for row, e in enumerate(running):
             if e in leaving:
                 retreat = task.retreat(e)
                 targets.q_goal[row], targets.q_toggle[row] = retreat, retreat
                 targets.gripper_toggle[row] = task.closed[e]
-        last = np.all(targets.q_goal == targets.q_toggle, axis=1) & (targets.gripper_toggle != task.closed[running])
+        last = np.all(targets.q_goal == targets.q_toggle, axis=1) & (
+            targets.gripper_toggle != task.closed[running]
+        )
         touching = touched.copy()
         touching[running] |= last
-        motion, segments = _plan(task, planner, propose, observation, targets, running, touching, seeds, number, config.carry_speed)
+        motion, segments = _plan(
+            task,
+            planner,
+            propose,
+            observation,
+            targets,
+            running,
+            touching,
+            seeds,
+            number,
+            config.carry_speed,
+        )
         status = motion.result.status
         executed = [e for e in running if len(motion.q[e]) > 1]
         if listen is not None:
-            listen(Phase(number, running, observation, targets, segments, motion, executed))
+            listen(
+                Phase(number, running, observation, targets, segments, motion, executed)
+            )
         task.follow(executed, [motion.q[e] for e in executed])
         at_toggle = [
             (e, bool(targets.gripper_toggle[row])) for row, e in enumerate(running)
@@ -169,7 +192,7 @@ def rollout(
             stuck[e] = 0 if moved or e in toggled else stuck[e] + 1
             touched[e] = e in toggled or (touched[e] and not moved)
             phases[e].append(PhaseRecord(
-                task.sim.q(e).tolist(), targets.q_goal[row].tolist(), targets.q_toggle[row].tolist(),
+                observation.q[row].tolist(), targets.q_goal[row].tolist(), targets.q_toggle[row].tolist(),
                 int(targets.gripper_toggle[row]), e in toggled, Status(status[e]).name, int(motion.result.expansions[e]),
                 motion.seconds / len(running), Rung(motion.rung[e]).name if moved else "NONE",
             ))  # fmt: skip
@@ -178,17 +201,29 @@ def rollout(
                 finished.append(e)
                 running.remove(e)
             elif stuck[e] >= config.max_stuck:
-                failures[e] = f"no motion in phase {number + 1}: {phases[e][-1].status}, " + _obstacle(planner, task, touching, e, phases[e][-1])
+                failures[e] = (
+                    f"no motion in phase {number + 1}: {phases[e][-1].status}, "
+                    + _obstacle(planner, task, touching, e, phases[e][-1])
+                )
                 running.remove(e)
     for e in running:
         failures[e] = f"not finished after {config.max_phases} phases"
     task.wait(finished, HOLD)
     for e in finished:
         failures[e] = task.failure(e)
-    return [EpisodeRecord(int(seeds[e]), failures[e] is None, failures[e], phases[e]) for e in lanes]
+    return [
+        EpisodeRecord(int(seeds[e]), failures[e] is None, failures[e], phases[e])
+        for e in lanes
+    ]
 
 
-def _obstacle(planner: MotionPlanner, task: Task, touching: np.ndarray, episode: int, phase: PhaseRecord) -> str:
+def _obstacle(
+    planner: MotionPlanner,
+    task: Task,
+    touching: np.ndarray,
+    episode: int,
+    phase: PhaseRecord,
+) -> str:
     """What is in the way at the phase's start and goal."""
     worlds = task.worlds(touching)
     at_start = planner.reason(worlds, episode, phase.q_start)
@@ -197,23 +232,48 @@ def _obstacle(planner: MotionPlanner, task: Task, touching: np.ndarray, episode:
 
 def _merge(targets: Targets, limits, distance: float) -> Targets:
     """Inside the limits; a subgoal next to the toggle becomes the toggle (section 4.2)."""
-    q_toggle = np.clip(targets.q_toggle, limits.q_min + 1e-3, limits.q_max - 1e-3).astype(np.float32)
-    q_goal = np.clip(targets.q_goal, limits.q_min + 1e-3, limits.q_max - 1e-3).astype(np.float32)
+    q_toggle = np.clip(
+        targets.q_toggle, limits.q_min + 1e-3, limits.q_max - 1e-3
+    ).astype(np.float32)
+    q_goal = np.clip(targets.q_goal, limits.q_min + 1e-3, limits.q_max - 1e-3).astype(
+        np.float32
+    )
     near = np.linalg.norm(q_goal - q_toggle, axis=1) < distance
-    return Targets(q_toggle, np.array(targets.gripper_toggle), np.where(near[:, None], q_toggle, q_goal))
+    return Targets(
+        q_toggle,
+        np.array(targets.gripper_toggle),
+        np.where(near[:, None], q_toggle, q_goal),
+    )
 
 
-def _plan(task, planner, propose, observation, targets, running, touching, seeds, number, carry_speed):
+def _plan(
+    task,
+    planner,
+    propose,
+    observation,
+    targets,
+    running,
+    touching,
+    seeds,
+    number,
+    carry_speed,
+):
     """One batched search; lanes that are not running are padding, so that nothing recompiles."""
     lanes = task.batch
     q_start = np.zeros((lanes, observation.q.shape[1]), np.float32)
     q_goal, q_toggle = q_start.copy(), q_start.copy()
-    q_start[running], q_goal[running], q_toggle[running] = observation.q, targets.q_goal, targets.q_toggle
+    q_start[running], q_goal[running], q_toggle[running] = (
+        observation.q,
+        targets.q_goal,
+        targets.q_toggle,
+    )
     active = np.zeros(lanes, bool)
     active[running] = True
     lane_seeds = np.zeros(lanes, np.uint32)
     lane_seeds[: len(seeds)] = seeds
-    keys = jax.vmap(lambda seed: jax.random.fold_in(jax.random.key(seed), number))(lane_seeds)
+    keys = jax.vmap(lambda seed: jax.random.fold_in(jax.random.key(seed), number))(
+        lane_seeds
+    )
     segments = None
     draw = None
     if propose is not None:
@@ -227,4 +287,6 @@ def _plan(task, planner, propose, observation, targets, running, touching, seeds
 
     speed = np.where(task.closed, carry_speed, 1.0)
     worlds = task.worlds(touching)
-    return planner.plan(worlds, q_start, q_goal, q_toggle, keys, draw, active, speed), segments
+    return planner.plan(
+        worlds, q_start, q_goal, q_toggle, keys, draw, active, speed
+    ), segments

@@ -18,6 +18,7 @@ LAYERS = (
     {"samplers", "simulation", "motion"},
     {"tasks", "learning", "policies"},
     {"rollout"},
+    {"agent"},
     {"evaluation"},
     {"solve", "train", "cli", "__init__", "__main__"},
 )

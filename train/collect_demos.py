@@ -55,11 +55,20 @@ class Collector:
         from jaxplan.tasks.mug.demonstrate import Recorder
 
         args, policy = self._args, self._policy
-        seeds = range(args.first_seed + index * args.shard_size, args.first_seed + (index + 1) * args.shard_size)
+        seeds = range(
+            args.first_seed + index * args.shard_size,
+            args.first_seed + (index + 1) * args.shard_size,
+        )
         policy.reset(seeds)
         recorder = Recorder(self._task, policy, seeds, args.demonstration)
         records = rollout(
-            self._task, seeds, lambda o, e: Targets(*policy(o, e)), self._planner, None, RolloutConfig(), recorder
+            self._task,
+            seeds,
+            lambda o, e: Targets(*policy(o, e)),
+            self._planner,
+            None,
+            RolloutConfig(),
+            recorder,
         )
         data.write_shard(data.shard_path(args.out, index), recorder.shard(records))
         return sum(record.success for record in records), len(records)
@@ -81,7 +90,9 @@ def _shard(index: int) -> tuple[int, int]:
 def main(args: Args) -> None:
     """Collects what is missing."""
     if args.episodes < 1 or args.shard_size < 1 or args.workers < 1:
-        raise ValueError(f"nothing to do: {args.episodes} episodes, {args.shard_size} a shard, {args.workers} workers")
+        raise ValueError(
+            f"nothing to do: {args.episodes} episodes, {args.shard_size} a shard, {args.workers} workers"
+        )
     count = -(-args.episodes // args.shard_size)
     settings = {
         "task": "mug", "first_seed": args.first_seed, "shard_size": args.shard_size, "camera": args.camera,
@@ -97,7 +108,9 @@ def main(args: Args) -> None:
     workers = min(args.workers, len(missing))
     solved = made = 0
     with (
-        ProcessPoolExecutor(workers, spawn, initializer=_start, initargs=(args,)) as pool,
+        ProcessPoolExecutor(
+            workers, spawn, initializer=_start, initargs=(args,)
+        ) as pool,
         tqdm(total=len(missing) * args.shard_size, unit="episode") as bar,
     ):
         for done in as_completed([pool.submit(_shard, index) for index in missing]):

@@ -5,6 +5,8 @@ import importlib
 import os
 import sys
 import weakref
+from collections.abc import Sequence
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
@@ -22,13 +24,27 @@ def _use_headless_gl() -> None:
 
     MuJoCo chooses by `MUJOCO_GL` when it is imported, which is too early for a library to set.
     """
-    if os.environ.get("MUJOCO_GL") or os.environ.get("DISPLAY") or sys.platform != "linux":
+    if (
+        os.environ.get("MUJOCO_GL")
+        or os.environ.get("DISPLAY")
+        or sys.platform != "linux"
+    ):
         return
     for name, library in (("egl", "EGL"), ("osmesa", "OSMesa")):
         if ctypes.util.find_library(library):
             gl_context.GLContext = importlib.import_module(f"mujoco.{name}").GLContext
             return
     raise NoGLError(ADVICE)
+
+
+class Mark(NamedTuple):
+    """A small sphere drawn into a picture."""
+
+    position: np.ndarray
+    """(3,) [m]."""
+    radius: float
+    """[m]."""
+    rgba: tuple[float, float, float, float]
 
 
 class Camera:
@@ -56,7 +72,18 @@ class Camera:
         options.geomgroup[[0, 1, 2]] = 1
         self._options = options
 
-    def render(self, data: mujoco.MjData, camera: str) -> np.ndarray:
-        """Image (height, width, 3) uint8 from a named camera."""
+    def render(
+        self, data: mujoco.MjData, camera: str, marks: Sequence[Mark] = ()
+    ) -> np.ndarray:
+        """Image (height, width, 3) uint8 from a named camera, with marks drawn into the scene."""
         self._renderer.update_scene(data, camera, self._options)
+        scene = self._renderer.scene
+        for mark in marks:
+            if scene.ngeom == scene.maxgeom:
+                break
+            mujoco.mjv_initGeom(
+                scene.geoms[scene.ngeom], mujoco.mjtGeom.mjGEOM_SPHERE, np.full(3, mark.radius),
+                np.asarray(mark.position, float), np.eye(3).ravel(), np.asarray(mark.rgba, np.float32),
+            )  # fmt: skip
+            scene.ngeom += 1
         return self._renderer.render()

@@ -55,7 +55,12 @@ class Simulator:
         """`function` of each episode, on all cores."""
         return list(self._pool.map(function, episodes))
 
-    def follow(self, episodes: Sequence[int], trajectories: Sequence[np.ndarray], settle: float = GRIPPER.settle) -> None:
+    def follow(
+        self,
+        episodes: Sequence[int],
+        trajectories: Sequence[np.ndarray],
+        settle: float = GRIPPER.settle,
+    ) -> None:
         """Tracks joint trajectories sampled at `CONTROL_PERIOD`, then stands still.
 
         Args:
@@ -68,7 +73,11 @@ class Simulator:
             episode, q = job
             data = self.data[episode]
             # Damping makes a position servo lag by kv / kp: the velocity is fed forward.
-            command = q + self._lag * np.gradient(q, CONTROL_PERIOD, axis=0) if len(q) > 1 else q
+            command = (
+                q + self._lag * np.gradient(q, CONTROL_PERIOD, axis=0)
+                if len(q) > 1
+                else q
+            )
             for command_k in command:
                 data.ctrl[:7] = command_k
                 self._advance(episode)
@@ -77,14 +86,21 @@ class Simulator:
 
         list(self._pool.map(run, zip(episodes, trajectories, strict=True)))
 
-    def move_fingers(self, episodes: Sequence[int], targets: Sequence[float], settle: float = GRIPPER.settle) -> None:
+    def move_fingers(
+        self,
+        episodes: Sequence[int],
+        targets: Sequence[float],
+        settle: float = GRIPPER.settle,
+    ) -> None:
         """Ramps both finger commands to `targets` [m] with the arm held still."""
 
         def run(job: tuple[int, float]) -> None:
             episode, target = job
             data = self.data[episode]
             start = data.ctrl[7:9].copy()
-            count = int(np.ceil(np.abs(target - start).max() / (GRIPPER.speed * CONTROL_PERIOD)))
+            count = int(
+                np.ceil(np.abs(target - start).max() / (GRIPPER.speed * CONTROL_PERIOD))
+            )
             for s in np.linspace(0, 1, count + 1)[1:]:
                 data.ctrl[7:9] = start + s * (target - start)
                 self._advance(episode)
@@ -97,7 +113,10 @@ class Simulator:
         if wide:
             self.move_fingers(episodes, [GRIPPER.open] * len(episodes), settle=0.0)
         else:
-            widths = [min(GRIPPER.open, self.fingers(e).mean() + GRIPPER.release) for e in episodes]
+            widths = [
+                min(GRIPPER.open, self.fingers(e).mean() + GRIPPER.release)
+                for e in episodes
+            ]
             self.move_fingers(episodes, widths)
 
     def close(self, episodes: Sequence[int]) -> None:

@@ -66,7 +66,10 @@ class Expert:
             return Toggle.GRASP2 if mug[2, 2] > 0.9 else Toggle.GRASP1
         position, _ = self._ik.pose(q)
         inside = mug[:3, :3].T @ (position - mug[:3, 3])
-        by_handle = np.hypot(inside[0], inside[1]) > (self._shape.radius + self._shape.handle_grip[0]) / 2
+        by_handle = (
+            np.hypot(inside[0], inside[1])
+            > (self._shape.radius + self._shape.handle_grip[0]) / 2
+        )
         return Toggle.RELEASE2 if by_handle else Toggle.RELEASE1
 
     def keyframes(self, mug: np.ndarray, q: np.ndarray, closed: bool) -> Keyframes:
@@ -88,22 +91,36 @@ class Expert:
         if len(targets) == 4:
             # Backing off must not change the arm's posture: continued from where the hand is.
             solved[0] = self._ik.solve(targets[0][:3, 3], targets[0][:3, :3], q)
-        return Keyframes(toggle, np.stack([s[0] for s in solved]), max(s[1] for s in solved))
+        return Keyframes(
+            toggle, np.stack([s[0] for s in solved]), max(s[1] for s in solved)
+        )
 
     def _grasp_rim(self, mug, q):
         axis = mug[:3, 2] * [1, 1, 0]
         axis /= np.linalg.norm(axis)
         side = np.cross(UP, axis)
         shape = self._shape
-        contact = mug[:3, 3] + axis * (shape.height / 2 - INSERTION) + side * (shape.radius - shape.wall / 2)
+        contact = (
+            mug[:3, 3]
+            + axis * (shape.height / 2 - INSERTION)
+            + side * (shape.radius - shape.wall / 2)
+        )
         contact[2] = shape.radius
         approach = -axis * np.cos(PITCH) - UP * np.sin(PITCH)
-        grasp = _pose(contact, np.stack([np.cross(-side, approach), -side, approach], 1))
-        return [_moved(grasp, -0.11 * approach + [0, 0, 0.05]), _moved(grasp, -0.06 * approach), grasp], Q_RIM
+        grasp = _pose(
+            contact, np.stack([np.cross(-side, approach), -side, approach], 1)
+        )
+        return [
+            _moved(grasp, -0.11 * approach + [0, 0, 0.05]),
+            _moved(grasp, -0.06 * approach),
+            grasp,
+        ], Q_RIM
 
     def _put_upright(self, mug, q):
         turned = self._handle_is_right(mug, q)
-        target = _pose([*STAGING, self._shape.height / 2 + DROP], _yaw(STAGING_YAWS[turned]))
+        target = _pose(
+            [*STAGING, self._shape.height / 2 + DROP], _yaw(STAGING_YAWS[turned])
+        )
         release = self._hand_for(mug, q, target)
         lift = _moved(_pose(*self._ik.pose(q)), [0, 0, 0.18])
         return [lift, _moved(release, [0, 0, 0.05]), release], Q_RIM
@@ -119,11 +136,15 @@ class Expert:
         frames = [_moved(grasp, [0, 0, 0.16]), _moved(grasp, [0, 0, 0.06]), grasp]
         hand = _pose(*self._ik.pose(q))
         at_rim = hand[2, 2] > -0.9 and np.linalg.norm(hand[:3, 3] - mug[:3, 3]) < 0.10
-        return ([_moved(hand, -RETREAT * hand[:3, 2]), *frames] if at_rim else frames), Q_HOME
+        return (
+            [_moved(hand, -RETREAT * hand[:3, 2]), *frames] if at_rim else frames
+        ), Q_HOME
 
     def _put_in_box(self, mug, q):
         middle = BOX_POSITION + [0, 0, BOX_FLOOR + self._shape.height / 2 + DROP]
-        release = self._hand_for(mug, q, _pose(middle, _yaw(BOX_YAWS[int(mug[1, 0] > 0)])))
+        release = self._hand_for(
+            mug, q, _pose(middle, _yaw(BOX_YAWS[int(mug[1, 0] > 0)]))
+        )
         lift = _moved(_pose(*self._ik.pose(q)), [0, 0, 0.12])
         return [lift, _moved(release, [0, 0, 0.09]), release], Q_HOME
 

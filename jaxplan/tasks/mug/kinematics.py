@@ -5,7 +5,6 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 
-
 RETREAT = 0.10
 """How far the hand backs off along its own axis after a release [m]."""
 
@@ -32,10 +31,17 @@ class InverseKinematics:
         """Position [m] and rotation matrix of the tool centre point."""
         self._data.qpos[:7] = q
         mujoco.mj_kinematics(self._model, self._data)
-        return self._data.site_xpos[self._site].copy(), self._data.site_xmat[self._site].reshape(3, 3).copy()
+        return self._data.site_xpos[self._site].copy(), self._data.site_xmat[
+            self._site
+        ].reshape(3, 3).copy()
 
     def solve(
-        self, position: np.ndarray, rotation: np.ndarray, q_reference: np.ndarray, step: float = 0.1, settle: int = 25
+        self,
+        position: np.ndarray,
+        rotation: np.ndarray,
+        q_reference: np.ndarray,
+        step: float = 0.1,
+        settle: int = 25,
     ) -> tuple[np.ndarray, float]:
         """Solves for a pose of the tool centre point.
 
@@ -51,7 +57,15 @@ class InverseKinematics:
         """
         p_0, r_0 = self.pose(q_reference)
         turn = Rotation.from_matrix(rotation @ r_0.T).as_rotvec()
-        strides = int(np.ceil(max(np.linalg.norm(position - p_0) / 0.4, np.linalg.norm(turn)) / step)) + 1
+        strides = (
+            int(
+                np.ceil(
+                    max(np.linalg.norm(position - p_0) / 0.4, np.linalg.norm(turn))
+                    / step
+                )
+            )
+            + 1
+        )
         q, error = q_reference.copy(), np.ones(6)
         for s in np.append(np.linspace(0, 1, strides + 1)[1:], np.ones(settle)):
             target = Rotation.from_rotvec(s * turn).as_matrix() @ r_0
@@ -61,7 +75,9 @@ class InverseKinematics:
                 break
             q, error = self._newton(q, position, rotation, q_reference)
         p, r = self.pose(q)
-        left = np.linalg.norm(position - p) + np.linalg.norm(Rotation.from_matrix(rotation @ r.T).as_rotvec())
+        left = np.linalg.norm(position - p) + np.linalg.norm(
+            Rotation.from_matrix(rotation @ r.T).as_rotvec()
+        )
         return q, float(left)
 
     def retreat(self, q: np.ndarray, distance: float) -> np.ndarray:
@@ -72,10 +88,14 @@ class InverseKinematics:
     def _newton(self, q, position, rotation, q_reference):
         p, r = self.pose(q)
         mujoco.mj_comPos(self._model, self._data)
-        mujoco.mj_jacSite(self._model, self._data, self._jacobian[:3], self._jacobian[3:], self._site)
+        mujoco.mj_jacSite(
+            self._model, self._data, self._jacobian[:3], self._jacobian[3:], self._site
+        )
         jacobian = self._jacobian[:, :7]
         turn = rotation @ r.T
-        w = 0.5 * np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]])
+        w = 0.5 * np.array(
+            [turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]]
+        )
         error = np.concatenate([position - p, w])
         posture = 0.3 * (q_reference - q)
         damped = jacobian @ jacobian.T + DAMPING

@@ -45,14 +45,41 @@ def collision_boxes(shape: MugShape) -> list[tuple[str, np.ndarray, np.ndarray, 
     for k in range(shape.sides):
         angle = 2 * np.pi * k / shape.sides
         centre = np.array([middle * np.cos(angle), middle * np.sin(angle), 0.0])
-        boxes.append((f"wall{k}", centre, np.array([shape.wall / 2, side, half]), angle))
+        boxes.append(
+            (f"wall{k}", centre, np.array([shape.wall / 2, side, half]), angle)
+        )
     inner = (shape.radius - shape.wall) / np.sqrt(2)
     z_bottom = -half + shape.bottom / 2
-    boxes.append(("bottom0", np.array([0, 0, z_bottom]), np.array([inner, inner, shape.bottom / 2]), 0.0))
-    boxes.append(("bottom1", np.array([0, 0, z_bottom]), np.array([inner, inner, shape.bottom / 2]), np.pi / 4))
+    boxes.append(
+        (
+            "bottom0",
+            np.array([0, 0, z_bottom]),
+            np.array([inner, inner, shape.bottom / 2]),
+            0.0,
+        )
+    )
+    boxes.append(
+        (
+            "bottom1",
+            np.array([0, 0, z_bottom]),
+            np.array([inner, inner, shape.bottom / 2]),
+            np.pi / 4,
+        )
+    )
     w = shape.handle_width / 2
-    bar_x, low, high = shape.handle_reach - w, shape.handle_low - half, shape.handle_high - half
-    boxes.append(("handle_bar", np.array([bar_x, 0, (low + high) / 2]), np.array([w, w, (high - low) / 2]), 0.0))
+    bar_x, low, high = (
+        shape.handle_reach - w,
+        shape.handle_low - half,
+        shape.handle_high - half,
+    )
+    boxes.append(
+        (
+            "handle_bar",
+            np.array([bar_x, 0, (low + high) / 2]),
+            np.array([w, w, (high - low) / 2]),
+            0.0,
+        )
+    )
     start = shape.radius - shape.wall
     arm = np.array([(bar_x - w - start) / 2, w, w])
     x = (bar_x - w + start) / 2
@@ -67,9 +94,20 @@ def planning_spheres(shape: MugShape) -> list[tuple[np.ndarray, float]]:
     spheres = []
     for z in np.linspace(-half + 0.0095, half - 0.0095, 5):
         for angle in 2 * np.pi * np.arange(12) / 12:
-            spheres.append((np.array([ring_radius * np.cos(angle), ring_radius * np.sin(angle), z]), r))
+            spheres.append(
+                (
+                    np.array(
+                        [ring_radius * np.cos(angle), ring_radius * np.sin(angle), z]
+                    ),
+                    r,
+                )
+            )
     w = shape.handle_width / 2
-    bar, low, high = shape.handle_reach - w, shape.handle_low - half, shape.handle_high - half
+    bar, low, high = (
+        shape.handle_reach - w,
+        shape.handle_low - half,
+        shape.handle_high - half,
+    )
     for z in np.linspace(low + w, high - w, 5):
         spheres.append((np.array([bar, 0, z]), 0.0105))
     for z in (low + w, high - w):
@@ -85,7 +123,10 @@ def add_mug(spec: mujoco.MjSpec, shape: MugShape = MugShape()) -> None:
     boxes = collision_boxes(shape)
     volume = sum(np.prod(2 * half) for _, _, half, _ in boxes)
     for name, centre, half, angle in boxes:
-        placement = {"pos": centre, "quat": [np.cos(angle / 2), 0, 0, np.sin(angle / 2)]}
+        placement = {
+            "pos": centre,
+            "quat": [np.cos(angle / 2), 0, 0, np.sin(angle / 2)],
+        }
         body.add_geom(
             name=f"mug_{name}", type=mujoco.mjtGeom.mjGEOM_BOX, size=half, group=3,
             mass=shape.mass * np.prod(2 * half) / volume, contype=1, conaffinity=3,
@@ -110,29 +151,57 @@ def add_mug(spec: mujoco.MjSpec, shape: MugShape = MugShape()) -> None:
 def _cup_mesh(shape: MugShape, sides: int = 48) -> tuple[np.ndarray, np.ndarray]:
     """Surface of revolution of the cup's profile, rim rounded."""
     half, r, w = shape.height / 2, shape.radius, shape.wall
-    rim = [(r - w / 2 + w / 2 * np.cos(a), half - w / 2 + w / 2 * np.sin(a)) for a in np.linspace(0, np.pi, 7)]
-    profile = [(0, -half), (r - 0.003, -half), (r - 0.001, -half + 0.001), (r, -half + 0.003)]
-    profile += [*rim, (r - w, -half + shape.bottom + 0.004), (r - w - 0.004, -half + shape.bottom), (0, -half + shape.bottom)]
+    rim = [
+        (r - w / 2 + w / 2 * np.cos(a), half - w / 2 + w / 2 * np.sin(a))
+        for a in np.linspace(0, np.pi, 7)
+    ]
+    profile = [
+        (0, -half),
+        (r - 0.003, -half),
+        (r - 0.001, -half + 0.001),
+        (r, -half + 0.003),
+    ]
+    profile += [
+        *rim,
+        (r - w, -half + shape.bottom + 0.004),
+        (r - w - 0.004, -half + shape.bottom),
+        (0, -half + shape.bottom),
+    ]
     angles = np.linspace(0, 2 * np.pi, sides, endpoint=False)
     ring = np.stack([np.cos(angles), np.sin(angles)], -1)
-    vertices = np.concatenate([np.c_[radius * ring, np.full(sides, z)] for radius, z in profile])
+    vertices = np.concatenate(
+        [np.c_[radius * ring, np.full(sides, z)] for radius, z in profile]
+    )
     return vertices, _grid_faces(len(profile), sides)
 
 
-def _handle_mesh(shape: MugShape, steps: int = 24, sides: int = 12) -> tuple[np.ndarray, np.ndarray]:
+def _handle_mesh(
+    shape: MugShape, steps: int = 24, sides: int = 12
+) -> tuple[np.ndarray, np.ndarray]:
     """A tube with a rounded square section swept along the handle's centre line."""
     half, w = shape.height / 2, shape.handle_width / 2
     low, high = shape.handle_low - half + w, shape.handle_high - half - w
     start, reach = shape.radius - shape.wall, shape.handle_reach - w
     t = np.linspace(-np.pi / 2, np.pi / 2, steps)
     curve = lambda a: np.sign(a) * np.abs(a) ** 0.4  # noqa: E731 (superellipse: nearly the boxes)
-    line = np.stack([start + (reach - start) * curve(np.cos(t)), 0 * t, (low + high) / 2 + (high - low) / 2 * curve(np.sin(t))], -1)
+    line = np.stack(
+        [
+            start + (reach - start) * curve(np.cos(t)),
+            0 * t,
+            (low + high) / 2 + (high - low) / 2 * curve(np.sin(t)),
+        ],
+        -1,
+    )
     tangent = np.gradient(line, axis=0)
     tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
     normal = np.stack([tangent[:, 2], 0 * t, -tangent[:, 0]], -1)
     angles = np.linspace(0, 2 * np.pi, sides, endpoint=False)
     section = w * np.stack([curve(np.cos(angles)), curve(np.sin(angles))], -1) * 0.95
-    rings = line[:, None] + section[None, :, :1] * normal[:, None] + section[None, :, 1:] * np.array([0, 1.0, 0])
+    rings = (
+        line[:, None]
+        + section[None, :, :1] * normal[:, None]
+        + section[None, :, 1:] * np.array([0, 1.0, 0])
+    )
     return rings.reshape(-1, 3), _grid_faces(steps, sides)
 
 
@@ -141,4 +210,6 @@ def _grid_faces(rings: int, sides: int) -> np.ndarray:
     i, j = np.meshgrid(np.arange(rings - 1), np.arange(sides), indexing="ij")
     a, b = i * sides + j, i * sides + (j + 1) % sides
     c, d = a + sides, b + sides
-    return np.concatenate([np.stack([a, b, d], -1).reshape(-1, 3), np.stack([a, d, c], -1).reshape(-1, 3)])
+    return np.concatenate(
+        [np.stack([a, b, d], -1).reshape(-1, 3), np.stack([a, d, c], -1).reshape(-1, 3)]
+    )

@@ -19,12 +19,16 @@ BOX_INNER, BOX_WALL, BOX_HEIGHT, BOX_FLOOR = 0.085, 0.005, 0.04, 0.004
 IMAGE_HEIGHT, IMAGE_WIDTH = 88, 136
 
 
-def build(kind: Literal["physics", "planning"] = "physics", shape: MugShape = MugShape()) -> mujoco.MjModel:
+def build(
+    kind: Literal["physics", "planning"] = "physics", shape: MugShape = MugShape()
+) -> mujoco.MjModel:
     """Compiles the scene; `kind` says whose geoms collide (DESIGN: two sets of geoms)."""
     return spec(kind, shape).compile()
 
 
-def spec(kind: Literal["physics", "planning"] = "physics", shape: MugShape = MugShape()) -> mujoco.MjSpec:
+def spec(
+    kind: Literal["physics", "planning"] = "physics", shape: MugShape = MugShape()
+) -> mujoco.MjSpec:
     """The scene before compilation."""
     panda = resources.files("jaxplan.scene") / "panda.xml"
     scene = mujoco.MjSpec.from_string(panda.read_text())
@@ -60,12 +64,19 @@ def _add_look(scene: mujoco.MjSpec) -> None:
     scene.visual.headlight.ambient = [0.35, 0.35, 0.35]
     scene.visual.headlight.diffuse = [0.35, 0.35, 0.35]
     scene.visual.headlight.specular = [0.1, 0.1, 0.1]
-    scene.add_material(name="mug", rgba=[0.16, 0.38, 0.72, 1], specular=0.5, shininess=0.6)
+    scene.add_material(
+        name="mug", rgba=[0.16, 0.38, 0.72, 1], specular=0.5, shininess=0.6
+    )
     scene.add_material(name="table", rgba=[0.76, 0.67, 0.54, 1], specular=0.1)
     scene.add_material(name="box", rgba=[0.30, 0.55, 0.34, 1], specular=0.1)
     scene.add_texture(name="sky", type=mujoco.mjtTexture.mjTEXTURE_SKYBOX, builtin=mujoco.mjtBuiltin.mjBUILTIN_GRADIENT,
                       rgb1=[0.92, 0.94, 0.96], rgb2=[0.62, 0.68, 0.74], width=64, height=384)  # fmt: skip
-    scene.worldbody.add_light(pos=[0.6, -0.8, 1.8], dir=[-0.2, 0.8, -1.6], diffuse=[0.5, 0.5, 0.5], castshadow=True)
+    scene.worldbody.add_light(
+        pos=[0.6, -0.8, 1.8],
+        dir=[-0.2, 0.8, -1.6],
+        diffuse=[0.5, 0.5, 0.5],
+        castshadow=True,
+    )
 
 
 def _add_table(scene: mujoco.MjSpec) -> None:
@@ -86,7 +97,12 @@ def _add_box(scene: mujoco.MjSpec) -> None:
     outer, middle = BOX_INNER + 2 * BOX_WALL, BOX_INNER + BOX_WALL
     parts = {"floor": ([0, 0, BOX_FLOOR / 2], [outer, outer, BOX_FLOOR / 2])}
     z, h = BOX_FLOOR + BOX_HEIGHT / 2, BOX_HEIGHT / 2
-    for name, x, y in (("front", 1, 0), ("back", -1, 0), ("left", 0, 1), ("right", 0, -1)):
+    for name, x, y in (
+        ("front", 1, 0),
+        ("back", -1, 0),
+        ("left", 0, 1),
+        ("right", 0, -1),
+    ):
         size = [BOX_WALL, outer, h] if x else [BOX_INNER, BOX_WALL, h]
         parts[name] = ([x * middle, y * middle, z], size)
     for name, (pos, size) in parts.items():
@@ -112,7 +128,9 @@ def _add_cameras(scene: mujoco.MjSpec) -> None:
         quat=_camera_quat(forward=[-np.sin(tilt), 0, np.cos(tilt)], up=[-1, 0, 0]),
     )  # fmt: skip
     target, eye = np.array([0.42, -0.08, 0.1]), np.array([1.25, -0.55, 0.75])
-    scene.worldbody.add_camera(name="static", pos=eye, fovy=45, quat=_camera_quat(target - eye, up=[0, 0, 1]))
+    scene.worldbody.add_camera(
+        name="static", pos=eye, fovy=45, quat=_camera_quat(target - eye, up=[0, 0, 1])
+    )
 
 
 def _camera_quat(forward: np.ndarray, up: np.ndarray) -> np.ndarray:

@@ -56,7 +56,13 @@ class MugTask:
         friction: Factor on every friction coefficient (0 shows that grasps hold by friction alone).
     """
 
-    def __init__(self, batch: int, camera: str = "hand", friction: float = 1.0, shape: MugShape = MugShape()) -> None:
+    def __init__(
+        self,
+        batch: int,
+        camera: str = "hand",
+        friction: float = 1.0,
+        shape: MugShape = MugShape(),
+    ) -> None:
         model = scene.build("physics", shape)
         model.geom_friction *= friction
         self.model, self.shape, self.batch = model, shape, batch
@@ -68,7 +74,10 @@ class MugTask:
         self._mug_body = model.body("mug").id
         self._kinematics = InverseKinematics(model)
         self.planning_scene = Scene.from_mjcf(scene.build("planning", shape))
-        self._allowed = {key: self.planning_scene.ignored(names) for key, names in allowed_contacts().items()}
+        self._allowed = {
+            key: self.planning_scene.ignored(names)
+            for key, names in allowed_contacts().items()
+        }
 
     def reset(self, episodes: Sequence[int], seeds: Sequence[int]) -> None:
         """Starts episodes: arm at home, gripper open, mug dropped and come to rest.
@@ -108,9 +117,13 @@ class MugTask:
         """Renders the camera and reads joints and gripper mode."""
         if self._camera is None:
             self._camera = Camera(self.model, scene.IMAGE_HEIGHT, scene.IMAGE_WIDTH)
-        images = [self._camera.render(self.sim.data[e], self._camera_name) for e in episodes]
+        images = [
+            self._camera.render(self.sim.data[e], self._camera_name) for e in episodes
+        ]
         q = np.array([self.sim.q(e) for e in episodes], np.float32)
-        return Observation(np.array(images), q, self.closed[list(episodes)].astype(np.uint8))
+        return Observation(
+            np.array(images), q, self.closed[list(episodes)].astype(np.uint8)
+        )
 
     def observe_at(self, episode: int, q: np.ndarray) -> Observation:
         """What the camera would see with the arm at `q` [rad]; a held mug moves along. Physics is not touched."""
@@ -122,12 +135,18 @@ class MugTask:
         mujoco.mj_kinematics(self.model, data)
         if self.held(episode):
             hand = self.hand_pose(data)
-            mug = hand @ np.linalg.inv(self.hand_pose(self.sim.data[episode])) @ self.mug(episode)
+            mug = (
+                hand
+                @ np.linalg.inv(self.hand_pose(self.sim.data[episode]))
+                @ self.mug(episode)
+            )
             data.qpos[9:12] = mug[:3, 3]
             data.qpos[12:16] = Rotation.from_matrix(mug[:3, :3]).as_quat()[[3, 0, 1, 2]]
         mujoco.mj_forward(self.model, data)
         image = self._camera.render(data, self._camera_name)
-        return Observation(image[None], np.float32(q)[None], self.closed[[episode]].astype(np.uint8))
+        return Observation(
+            image[None], np.float32(q)[None], self.closed[[episode]].astype(np.uint8)
+        )
 
     def hand_pose(self, data: mujoco.MjData) -> np.ndarray:
         """Pose of the hand's frame in the world, (4, 4)."""
@@ -141,7 +160,10 @@ class MugTask:
         touching = set()
         for contact in self.sim.data[episode].contact:
             for pad, other in (contact.geom, contact.geom[::-1]):
-                if pad in self._pads and self.model.geom_bodyid[other] == self._mug_body:
+                if (
+                    pad in self._pads
+                    and self.model.geom_bodyid[other] == self._mug_body
+                ):
                     touching.add(pad)
         return len(touching)
 
@@ -149,7 +171,9 @@ class MugTask:
         """Whether the closed gripper has the mug between both pads."""
         return bool(self.closed[episode]) and self.pads_touching(episode) == 2
 
-    def follow(self, episodes: Sequence[int], trajectories: Sequence[np.ndarray]) -> None:
+    def follow(
+        self, episodes: Sequence[int], trajectories: Sequence[np.ndarray]
+    ) -> None:
         """Executes timed trajectories."""
         self.sim.follow(episodes, trajectories)
 
@@ -189,21 +213,32 @@ class MugTask:
         data, mug, held = self.sim.data[episode], self.mug(episode), self.held(episode)
         if held:
             mug = np.linalg.inv(self.hand_pose(data)) @ mug
-        pose = np.concatenate([mug[:3, 3], Rotation.from_matrix(mug[:3, :3]).as_quat()[[3, 0, 1, 2]]])
+        pose = np.concatenate(
+            [mug[:3, 3], Rotation.from_matrix(mug[:3, :3]).as_quat()[[3, 0, 1, 2]]]
+        )
         ignored = self._allowed["held" if held else "free", touching]
-        return World(np.float32(pose[None]), np.array([held]), np.float32(data.qpos[7:9].clip(0, 0.04)), ignored)
+        return World(
+            np.float32(pose[None]),
+            np.array([held]),
+            np.float32(data.qpos[7:9].clip(0, 0.04)),
+            ignored,
+        )
 
     def in_terminal_region(self, episode: int) -> bool:
         """Q_term: gripper open, tool centre point low over the target box. Known from the joints alone."""
         tcp = self.sim.data[episode].site("tcp").xpos
-        inside = np.all(np.abs(tcp[:2] - scene.BOX_POSITION[:2]) < scene.BOX_INNER + 0.02)
+        inside = np.all(
+            np.abs(tcp[:2] - scene.BOX_POSITION[:2]) < scene.BOX_INNER + 0.02
+        )
         return bool(not self.closed[episode] and inside and tcp[2] < 0.12)
 
     def failure(self, episode: int) -> str | None:
         """Why the finished episode is no success; None if the mug stands in the box, at rest and let go."""
         mug, data = self.mug(episode), self.sim.data[episode]
         checks = {
-            "the mug is outside the box": np.any(np.abs((mug[:3, 3] - scene.BOX_POSITION)[:2]) > scene.BOX_INNER),
+            "the mug is outside the box": np.any(
+                np.abs((mug[:3, 3] - scene.BOX_POSITION)[:2]) > scene.BOX_INNER
+            ),
             "the mug is not upright": mug[2, 2] < np.cos(np.radians(20)),
             "the mug is not at rest": np.linalg.norm(data.qvel[9:12]) > 0.01,
             "the gripper is closed": self.closed[episode],
@@ -226,7 +261,9 @@ def allowed_contacts() -> dict[tuple[str, bool], list[str]]:
     }
 
 
-def sample_pose(seed: int, shape: MugShape = MugShape()) -> tuple[np.ndarray, np.ndarray]:
+def sample_pose(
+    seed: int, shape: MugShape = MugShape()
+) -> tuple[np.ndarray, np.ndarray]:
     """Position [m] and rotation matrix from which the mug of a seed is dropped."""
     rng = np.random.default_rng(seed)
     x, y, yaw = rng.uniform(*np.array([RANGE.x, RANGE.y, RANGE.yaw]).T)
@@ -235,7 +272,9 @@ def sample_pose(seed: int, shape: MugShape = MugShape()) -> tuple[np.ndarray, np
     # At rest the handle's tip touches the table: this far below the horizontal, on either side.
     rest = np.arcsin(shape.radius / shape.handle_reach)
     angle = np.pi + rest - off if right else -rest + off
-    axis = np.array([np.cos(yaw) * np.cos(pitch), np.sin(yaw) * np.cos(pitch), np.sin(pitch)])
+    axis = np.array(
+        [np.cos(yaw) * np.cos(pitch), np.sin(yaw) * np.cos(pitch), np.sin(pitch)]
+    )
     side = np.array([-np.sin(yaw), np.cos(yaw), 0.0])
     handle = np.cos(angle) * side + np.sin(angle) * np.cross(axis, side)
     rotation = np.stack([handle, np.cross(axis, handle), axis], 1)

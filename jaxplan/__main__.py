@@ -1,0 +1,7 @@
+"""`python -m jaxplan` is the command `jaxplan`."""
+
+import sys
+
+from jaxplan.cli import main
+
+sys.exit(main())

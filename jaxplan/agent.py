@@ -1,0 +1,86 @@
+"""The learned half of Algorithm 1: the upper network and the sampler, ready for the outer loop."""
+
+import dataclasses
+from collections.abc import Callable
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jaxplan.learning import Weights
+from jaxplan.networks import Cond, predict
+from jaxplan.planning import Segment
+from jaxplan.rollout import Targets
+from jaxplan.samplers import diffusion
+
+BANK = 32
+"""Learned segments drawn at a time for a phase; a search that uses them up gets as many more."""
+
+
+class Agent:
+    """Predictor and sampler with their weights, for batches of one size.
+
+    Each network compiles once: batches that are short of episodes are padded.
+
+    Args:
+        predictor: Weights of the upper network.
+        sampler: Weights of the sampler that was trained on its features.
+        batch: Lanes of the outer loop.
+        inference_steps: DDIM steps; None takes the sampler's own number.
+    """
+
+    def __init__(
+        self,
+        predictor: Weights,
+        sampler: Weights,
+        batch: int,
+        inference_steps: int | None = None,
+    ) -> None:
+        self.batch = batch
+        self._features = np.zeros((batch, 0), np.float32)
+        config = sampler.config
+        if inference_steps is not None:
+            config = dataclasses.replace(config, num_inference_steps=inference_steps)
+        self._own_encoder = config.encoder is not None
+
+        @jax.jit
+        def upper(image, q, gripper):
+            return predict(predictor.config, predictor.params, image, q, gripper)
+
+        @jax.jit
+        def segments(cond, keys, chunk):
+            keys = jax.vmap(jax.random.fold_in)(keys, chunk)
+            return diffusion.draw(config, sampler.params, cond, keys, BANK)
+
+        self.upper, self.segments = upper, segments
+
+    def predict(self, observation, episodes: list[int]) -> Targets:
+        """Targets of the observed episodes: the outer loop's `predict`."""
+        padded = [self._pad(column, episodes) for column in observation]
+        subgoal, features = self.upper(*padded)
+        self._features = features
+        rows = [
+            np.asarray(column)[episodes]
+            for column in (subgoal.q_toggle, subgoal.gripper_toggle, subgoal.q_goal)
+        ]
+        return Targets(*rows)
+
+    def propose(
+        self, observation, targets: Targets, episodes: list[int], keys: jax.Array
+    ) -> Callable[[jax.Array], Segment]:
+        """Learned segments of a phase: the outer loop's `propose`.
+
+        The condition holds the targets that the planner got, after merging.
+        """
+        image, q, gripper = (self._pad(column, episodes) for column in observation)
+        targets = Targets(*(self._pad(column, episodes) for column in targets))
+        cond = Cond(
+            image if self._own_encoder else self._features,
+            q, gripper, targets.q_toggle, targets.gripper_toggle, targets.q_goal,
+        )  # fmt: skip
+        return lambda chunk: self.segments(cond, keys, jnp.asarray(chunk))
+
+    def _pad(self, column: np.ndarray, episodes: list[int]) -> np.ndarray:
+        padded = np.zeros((self.batch, *column.shape[1:]), column.dtype)
+        padded[episodes] = column
+        return padded

@@ -1,0 +1,66 @@
+"""The command `jaxplan`."""
+
+import contextlib
+import difflib
+import io
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+COMMANDS = ("solve",)
+
+
+@dataclass(frozen=True)
+class Solve:
+    """Plans and executes one mug episode with the shipped weights."""
+
+    seed: int
+    """Of the mug's pose; training never saw seeds from 100000 on."""
+    out: Path | None = None
+    """Directory for episode.json, a video and a film strip."""
+    weights: Path | None = None
+    """Directory with predictor, sampler and manifest; the package's own by default."""
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Runs a command; 0 when done, 1 if the episode failed, 2 for bad input."""
+    arguments = sys.argv[1:] if arguments is None else arguments
+    if arguments and not arguments[0].startswith("-") and arguments[0] not in COMMANDS:
+        near = difflib.get_close_matches(arguments[0], COMMANDS, 1)
+        hint = (
+            f"; did you mean {near[0]}?"
+            if near
+            else f" (there is: {', '.join(COMMANDS)})"
+        )
+        return _fail(f"unknown command {arguments[0]!r}{hint}")
+    command = tyro.extras.subcommand_cli_from_dict(
+        {"solve": Solve}, prog="jaxplan", args=arguments
+    )
+    try:
+        return _solve(command)
+    except (ValueError, RuntimeError) as error:
+        return _fail(str(error).splitlines()[0])
+
+
+def _solve(command: Solve) -> int:
+    if command.seed < 0:
+        raise ValueError(f"seed {command.seed}: expected 0 or more")
+    with contextlib.redirect_stdout(io.StringIO()):  # `import mujoco.mjx` prints
+        from jaxplan.learning import load_pair
+        from jaxplan.learning.pretrained import DIRECTORY
+        from jaxplan.solve import solve
+    weights = load_pair(command.weights or DIRECTORY)
+    record = solve(command.seed, weights, command.out)
+    return 0 if record.success else 1
+
+
+def _fail(message: str) -> int:
+    print(f"error: {message}", file=sys.stderr)
+    return 2
+
+
+if __name__ == "__main__":
+    sys.exit(main())
