@@ -35,20 +35,55 @@ class Task(Protocol):
     batch: int
     closed: np.ndarray
 
-    def reset(self, episodes: Sequence[int], seeds: Sequence[int]) -> None: ...
-    def in_range(self, episode: int) -> bool: ...
-    def observe(self, episodes: Sequence[int]) -> Any: ...
-    def worlds(self, touching: np.ndarray) -> World: ...
+    def reset(self, episodes: Sequence[int], seeds: Sequence[int]) -> None:
+        """Starts episodes from seeds."""
+        ...
+
+    def in_range(self, episode: int) -> bool:
+        """Whether an episode started inside the randomised range."""
+        ...
+
+    def observe(self, episodes: Sequence[int]) -> Any:
+        """What the networks are shown, one row an episode."""
+        ...
+
+    def worlds(self, touching: np.ndarray) -> World:
+        """What planning may know, one row a lane; `touching` allows contacts at toggles."""
+        ...
+
     def follow(
         self, episodes: Sequence[int], trajectories: Sequence[np.ndarray]
-    ) -> None: ...
-    def toggle(self, episodes: Sequence[int], close: Sequence[bool]) -> None: ...
-    def widen(self, episodes: Sequence[int]) -> None: ...
-    def wait(self, episodes: Sequence[int], seconds: float) -> None: ...
-    def in_terminal_region(self, episode: int) -> bool: ...
-    def retreat(self, episode: int) -> np.ndarray: ...
-    def arrived(self, episode: int, q: np.ndarray) -> bool: ...
-    def failure(self, episode: int) -> str | None: ...
+    ) -> None:
+        """Executes joint trajectories."""
+        ...
+
+    def toggle(self, episodes: Sequence[int], close: Sequence[bool]) -> None:
+        """Toggles grippers, once."""
+        ...
+
+    def widen(self, episodes: Sequence[int]) -> None:
+        """Opens released grippers all the way."""
+        ...
+
+    def wait(self, episodes: Sequence[int], seconds: float) -> None:
+        """Lets time pass [s]."""
+        ...
+
+    def in_terminal_region(self, episode: int) -> bool:
+        """Whether the joints lie in Q_term."""
+        ...
+
+    def retreat(self, episode: int) -> np.ndarray:
+        """Joints of a hand that has backed off [rad]."""
+        ...
+
+    def arrived(self, episode: int, q: np.ndarray) -> bool:
+        """Whether the arm is at `q`."""
+        ...
+
+    def failure(self, episode: int) -> str | None:
+        """Why a finished episode is no success, or None."""
+        ...
 
 
 class PhaseRecord(NamedTuple):
@@ -93,6 +128,12 @@ class Phase(NamedTuple):
     observation: Any
     targets: Targets
     """After merging: where the subgoal is the toggle, they are equal."""
+    last: np.ndarray
+    """(B,) bool: the motion ends at a toggle."""
+    leaving: list[int]
+    """Episodes in the terminal region: they back off, and end."""
+    worlds: World
+    """What the search was told of each lane's world."""
     segments: Segment | None
     motion: Motion
     """Rows are lanes: row e belongs to episode e of the batch."""
@@ -131,162 +172,176 @@ def rollout(
     Returns:
         One record per seed, in order.
     """
-    lanes = list(range(len(seeds)))
-    task.reset(lanes, seeds)
-    phases: list[list[PhaseRecord]] = [[] for _ in lanes]
-    failures: list[str | None] = [
-        None if task.in_range(e) else "the mug came to rest outside the range"
-        for e in lanes
-    ]
-    running = [e for e in lanes if failures[e] is None]
-    finished: list[int] = []
-    stuck = np.zeros(len(lanes), int)
-    touched = np.zeros(task.batch, bool)
-    """Episodes whose last act was a toggle: the next motion leaves what the hand touched."""
+    task.reset(range(len(seeds)), seeds)
+    batch = _Batch(task, seeds)
     for number in range(config.max_phases):
-        if not running:
+        if not batch.running:
             break
-        leaving = [e for e in running if task.in_terminal_region(e)]
-        observation = task.observe(running)
-        targets = _merge(
-            predict(observation, running), planner.limits, config.merge_distance
-        )
-        for row, e in enumerate(running):
-            if e in leaving:
-                retreat = task.retreat(e)
-                targets.q_goal[row], targets.q_toggle[row] = retreat, retreat
-                targets.gripper_toggle[row] = task.closed[e]
-        last = np.all(targets.q_goal == targets.q_toggle, axis=1) & (
-            targets.gripper_toggle != task.closed[running]
-        )
-        touching = touched.copy()
-        touching[running] |= last
-        motion, segments = _plan(
-            task,
-            planner,
-            propose,
-            observation,
-            targets,
-            running,
-            touching,
-            seeds,
-            number,
-            config.carry_speed,
-        )
-        status = motion.result.status
-        executed = [e for e in running if len(motion.q[e]) > 1]
+        phase = _plan(batch, number, predict, planner, propose, config)
         if listen is not None:
-            listen(
-                Phase(number, running, observation, targets, segments, motion, executed)
+            listen(phase)
+        toggled = _execute(batch, phase)
+        _record(batch, phase, toggled)
+        for e in list(batch.running):
+            if e in phase.leaving and e in phase.executed:
+                batch.end(e, None)
+            elif batch.stuck[e] >= config.max_stuck:
+                batch.end(e, _obstacle(planner, phase, e))
+    for e in list(batch.running):
+        batch.end(e, f"not finished after {config.max_phases} phases")
+    return batch.judge()
+
+
+class _Batch:
+    """Who is still running, and how it went so far. An episode's number is its lane."""
+
+    def __init__(self, task: Task, seeds: Sequence[int]) -> None:
+        self.task, self.seeds = task, seeds
+        self.phases: list[list[PhaseRecord]] = [[] for _ in seeds]
+        self.failures: dict[int, str | None] = {}
+        self.stuck = np.zeros(task.batch, int)
+        """Phases in a row without a motion."""
+        self.touched = np.zeros(task.batch, bool)
+        """The last act was a toggle: the next motion leaves what the hand touched."""
+        self.running = list(range(len(seeds)))
+        for e in list(self.running):
+            if not task.in_range(e):
+                self.end(e, "the mug came to rest outside the range")
+
+    def end(self, episode: int, failure: str | None) -> None:
+        """Takes an episode out of the loop; None leaves the verdict to the judge."""
+        self.failures[episode] = failure
+        self.running.remove(episode)
+
+    def judge(self) -> list[EpisodeRecord]:
+        """The records of all episodes, once none is running."""
+        finished = [e for e, failure in self.failures.items() if failure is None]
+        self.task.wait(finished, HOLD)
+        for e in finished:
+            self.failures[e] = self.task.failure(e)
+        return [
+            EpisodeRecord(
+                int(seed), self.failures[e] is None, self.failures[e], self.phases[e]
             )
-        task.follow(executed, [motion.q[e] for e in executed])
-        at_toggle = [
-            (e, bool(targets.gripper_toggle[row])) for row, e in enumerate(running)
-            if last[row] and task.arrived(e, targets.q_toggle[row])
-        ]  # fmt: skip
-        task.widen([e for e in executed if touched[e]])
-        task.toggle([e for e, _ in at_toggle], [close for _, close in at_toggle])
-        toggled = {e for e, _ in at_toggle}
-        for row, e in enumerate(running):
-            moved = e in executed
-            stuck[e] = 0 if moved or e in toggled else stuck[e] + 1
-            touched[e] = e in toggled or (touched[e] and not moved)
-            phases[e].append(PhaseRecord(
-                observation.q[row].tolist(), targets.q_goal[row].tolist(), targets.q_toggle[row].tolist(),
-                int(targets.gripper_toggle[row]), e in toggled, Status(status[e]).name, int(motion.result.expansions[e]),
-                motion.seconds / len(running), Rung(motion.rung[e]).name if moved else "NONE",
-            ))  # fmt: skip
-        for e in list(running):
-            if e in leaving and e in executed:
-                finished.append(e)
-                running.remove(e)
-            elif stuck[e] >= config.max_stuck:
-                failures[e] = (
-                    f"no motion in phase {number + 1}: {phases[e][-1].status}, "
-                    + _obstacle(planner, task, touching, e, phases[e][-1])
-                )
-                running.remove(e)
-    for e in running:
-        failures[e] = f"not finished after {config.max_phases} phases"
-    task.wait(finished, HOLD)
-    for e in finished:
-        failures[e] = task.failure(e)
-    return [
-        EpisodeRecord(int(seeds[e]), failures[e] is None, failures[e], phases[e])
-        for e in lanes
-    ]
-
-
-def _obstacle(
-    planner: MotionPlanner,
-    task: Task,
-    touching: np.ndarray,
-    episode: int,
-    phase: PhaseRecord,
-) -> str:
-    """What is in the way at the phase's start and goal."""
-    worlds = task.worlds(touching)
-    at_start = planner.reason(worlds, episode, phase.q_start)
-    return f"at its start {at_start}; at its goal {planner.reason(worlds, episode, phase.subgoal)}"
-
-
-def _merge(targets: Targets, limits, distance: float) -> Targets:
-    """Inside the limits; a subgoal next to the toggle becomes the toggle (section 4.2)."""
-    q_toggle = np.clip(
-        targets.q_toggle, limits.q_min + 1e-3, limits.q_max - 1e-3
-    ).astype(np.float32)
-    q_goal = np.clip(targets.q_goal, limits.q_min + 1e-3, limits.q_max - 1e-3).astype(
-        np.float32
-    )
-    near = np.linalg.norm(q_goal - q_toggle, axis=1) < distance
-    return Targets(
-        q_toggle,
-        np.array(targets.gripper_toggle),
-        np.where(near[:, None], q_toggle, q_goal),
-    )
+            for e, seed in enumerate(self.seeds)
+        ]
 
 
 def _plan(
-    task,
-    planner,
-    propose,
-    observation,
-    targets,
-    running,
-    touching,
-    seeds,
-    number,
-    carry_speed,
-):
-    """One batched search; lanes that are not running are padding, so that nothing recompiles."""
-    lanes = task.batch
-    q_start = np.zeros((lanes, observation.q.shape[1]), np.float32)
-    q_goal, q_toggle = q_start.copy(), q_start.copy()
-    q_start[running], q_goal[running], q_toggle[running] = (
-        observation.q,
-        targets.q_goal,
-        targets.q_toggle,
-    )
-    active = np.zeros(lanes, bool)
-    active[running] = True
-    lane_seeds = np.zeros(lanes, np.uint32)
-    lane_seeds[: len(seeds)] = seeds
-    keys = jax.vmap(lambda seed: jax.random.fold_in(jax.random.key(seed), number))(
-        lane_seeds
-    )
-    segments = None
+    batch: _Batch,
+    number: int,
+    predict: Predict,
+    planner: MotionPlanner,
+    propose: Propose | None,
+    config: RolloutConfig,
+) -> Phase:
+    """Observes, predicts and plans: lines 3 to 28 of Algorithm 1 for all running episodes."""
+    task, running = batch.task, list(batch.running)
+    leaving = [e for e in running if task.in_terminal_region(e)]
+    observation = task.observe(running)
+    targets = _merge(predict(observation, running), planner, config.merge_distance)
+    for e in leaving:
+        row = running.index(e)
+        targets.q_goal[row] = targets.q_toggle[row] = task.retreat(e)
+        targets.gripper_toggle[row] = task.closed[e]
+    at_toggle = np.all(targets.q_goal == targets.q_toggle, axis=1)
+    last = at_toggle & (targets.gripper_toggle != task.closed[running])
+    touching = batch.touched.copy()
+    touching[running] |= last
+    worlds = task.worlds(touching)
+    keys = _keys(batch.seeds, task.batch, number)
+    segments: list[Segment] = []
     draw = None
     if propose is not None:
         draw_bank = propose(observation, targets, running, keys)
 
-        def draw(chunk):
-            nonlocal segments
-            bank = draw_bank(chunk)
-            segments = bank if segments is None else segments
-            return bank
+        def draw(chunk: jax.Array) -> Segment:
+            segments.append(draw_bank(chunk))
+            return segments[-1]
 
-    speed = np.where(task.closed, carry_speed, 1.0)
-    worlds = task.worlds(touching)
-    return planner.plan(
-        worlds, q_start, q_goal, q_toggle, keys, draw, active, speed
-    ), segments
+    # Lanes that are not running are padding, so that nothing recompiles.
+    query = np.zeros((3, task.batch, observation.q.shape[1]), np.float32)
+    query[:, running] = observation.q, targets.q_goal, targets.q_toggle
+    active = np.isin(np.arange(task.batch), running)
+    speed = np.where(task.closed, config.carry_speed, 1.0)
+    motion = planner.plan(worlds, *query, keys, draw, active, speed)
+    return Phase(
+        number=number,
+        episodes=running,
+        observation=observation,
+        targets=targets,
+        last=last,
+        leaving=leaving,
+        worlds=worlds,
+        segments=segments[0] if segments else None,
+        motion=motion,
+        executed=[e for e in running if len(motion.q[e]) > 1],
+    )
+
+
+def _execute(batch: _Batch, phase: Phase) -> set[int]:
+    """Moves, and toggles grippers that have arrived; returns the episodes that toggled."""
+    task = batch.task
+    task.follow(phase.executed, [phase.motion.q[e] for e in phase.executed])
+    task.widen([e for e in phase.executed if batch.touched[e]])
+    close = {
+        e: bool(phase.targets.gripper_toggle[row])
+        for row, e in enumerate(phase.episodes)
+        if phase.last[row] and task.arrived(e, phase.targets.q_toggle[row])
+    }
+    task.toggle(list(close), list(close.values()))
+    for e in phase.episodes:
+        moved = e in phase.executed
+        batch.stuck[e] = 0 if moved or e in close else batch.stuck[e] + 1
+        batch.touched[e] = e in close or (batch.touched[e] and not moved)
+    return set(close)
+
+
+def _record(batch: _Batch, phase: Phase, toggled: set[int]) -> None:
+    result, targets = phase.motion.result, phase.targets
+    for row, e in enumerate(phase.episodes):
+        moved = e in phase.executed
+        batch.phases[e].append(
+            PhaseRecord(
+                q_start=phase.observation.q[row].tolist(),
+                subgoal=targets.q_goal[row].tolist(),
+                q_toggle=targets.q_toggle[row].tolist(),
+                gripper_toggle=int(targets.gripper_toggle[row]),
+                toggled=e in toggled,
+                status=Status(result.status[e]).name,
+                expansions=int(result.expansions[e]),
+                planning_seconds=phase.motion.seconds / len(phase.episodes),
+                smoothing=Rung(phase.motion.rung[e]).name if moved else "NONE",
+            )
+        )
+
+
+def _merge(targets: Targets, planner: MotionPlanner, distance: float) -> Targets:
+    """Inside the limits; a subgoal next to the toggle becomes the toggle (section 4.2)."""
+    low, high = planner.limits.q_min + 1e-3, planner.limits.q_max - 1e-3
+    q_toggle = np.clip(targets.q_toggle, low, high).astype(np.float32)
+    q_goal = np.clip(targets.q_goal, low, high).astype(np.float32)
+    near = np.linalg.norm(q_goal - q_toggle, axis=1) < distance
+    q_goal = np.where(near[:, None], q_toggle, q_goal)
+    return Targets(q_toggle, np.array(targets.gripper_toggle), q_goal)
+
+
+def _keys(seeds: Sequence[int], lanes: int, number: int) -> jax.Array:
+    """A key per lane from its seed and the phase's number, whatever runs beside it."""
+    padded = np.zeros(lanes, np.uint32)
+    padded[: len(seeds)] = seeds
+    return jax.vmap(lambda seed: jax.random.fold_in(jax.random.key(seed), number))(
+        padded
+    )
+
+
+def _obstacle(planner: MotionPlanner, phase: Phase, episode: int) -> str:
+    """Why an episode found no motion: the search's status, and what is in the way."""
+    row = phase.episodes.index(episode)
+    status = Status(phase.motion.result.status[episode]).name
+    at_start = planner.reason(phase.worlds, episode, phase.observation.q[row])
+    at_goal = planner.reason(phase.worlds, episode, phase.targets.q_goal[row])
+    return (
+        f"no motion in phase {phase.number + 1}: {status}; "
+        f"nearest at its start: {at_start}; at its goal: {at_goal}"
+    )
