@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from functools import cache
+from typing import Literal
 
 import jax
 import jax.numpy as jnp
@@ -94,8 +95,8 @@ def test_batched_search_is_the_sequential_one(config):
     chunks = [draw(jnp.full(count, c)) for c in range(100 // 8 + 1)]
     for p in range(count):
         segments = Segment(
-            np.concatenate([c.direction[p] for c in chunks]),
-            np.concatenate([c.length[p] for c in chunks]),
+            jnp.concatenate([c.direction[p] for c in chunks]),
+            jnp.concatenate([c.length[p] for c in chunks]),
         )
         world = Spheres(worlds.centre[p], worlds.radius[p])
         oracle = Oracle(
@@ -195,7 +196,7 @@ def test_results_do_not_depend_on_the_batch(method):
     assert np.all(padded.path_length[4:] == 0)
 
 
-def small(method="rrt_connect"):
+def small(method: Literal["rrt", "rrt_connect"] = "rrt_connect"):
     """One planner for the tests that need nothing special: 16 lanes, 60 expansions."""
     return planner(PlannerConfig(method=method, max_expansions=60, proposals=8))
 

@@ -95,7 +95,9 @@ def make_planner(
         if {len(q) for q in query} != {problems}:
             sizes = [len(q) for q in query]
             raise ValueError(f"q_start, q_goal, q_toggle, keys have lengths {sizes}")
-        active = jnp.ones(problems, bool) if active is None else jnp.asarray(active)
+        active = (
+            jnp.ones(problems, bool) if active is None else jnp.asarray(active, bool)
+        )
         state = start(worlds, query, active)
         if draw is None or config.p_uniform >= 1:
             return finish(grow(worlds, state, None))
