@@ -10,17 +10,10 @@ from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 
-from jaxplan.collision.kinematics import Pose, body_poses
-from jaxplan.collision.narrow import (
-    FUNCTIONS,
-    Score,
-    Shapes,
-    join,
-    place,
-    place_back,
-    read,
-)
+from jaxplan.collision.kinematics import link_poses
+from jaxplan.collision.narrow import FUNCTIONS, Score, read, relative, smaller
 from jaxplan.collision.world import World
 from jaxplan.scene import Geoms, Scene
 
@@ -32,12 +25,16 @@ BLOCK = 256
 
 
 class Front(NamedTuple):
-    """Geoms of several bodies that face the same obstacles."""
+    """Geoms of several bodies that face the same obstacles, all of one body."""
 
-    facing: tuple[Geoms, ...]
+    facing: tuple[int, ...]
+    """Geom ids."""
+    links: tuple[int, ...]
+    """Kinematic link of each."""
     groups: tuple[int, ...]
     """Contact group of each."""
     obstacles: tuple[Geoms, ...]
+    kinds: tuple[str, str]
 
 
 def missing_kinds(scene: Scene) -> set[tuple[str, str]]:
@@ -59,23 +56,24 @@ def least_scores(scene: Scene, world: World, q: jax.Array, score: Score) -> jax.
         `[N]`.
     """
     fronts = _fronts(scene)
-    sets = {g for front in fronts for g in (*front.facing, *front.obstacles)}
-    shapes = {geoms: read(scene, geoms) for geoms in sets}
+    link_of = scene.structure.link_of
+    facing = [read(scene, front.facing) for front in fronts]
+    obstacles = [[read(scene, o.ids) for o in front.obstacles] for front in fronts]
 
     def block(q: jax.Array, world: World) -> jax.Array:
-        poses = body_poses(scene, world, q)
-        placed = {geoms: place(shapes[geoms], poses[geoms.body]) for geoms in sets}
-        rated = jnp.full(q.shape[-1], jnp.inf)
+        poses = link_poses(scene, world, q)
         counts = _counts(scene, world)
-        for front in fronts:
-            scores = _front_scores(front, shapes, placed, poses, score)
-            start = 0
-            for geoms, group in zip(front.facing, front.groups, strict=True):
-                end = start + len(geoms.ids)
-                least = jnp.min(scores[start:end], 0)
-                rated = jnp.minimum(rated, jnp.where(counts[group], least, jnp.inf))
-                start = end
-        return rated
+        least = []
+        for front, own, against in zip(fronts, facing, obstacles, strict=True):
+            frame = poses[link_of[front.obstacles[0].body]]
+            near = relative(own, poses[np.array(front.links)], frame)
+            function = FUNCTIONS[front.kinds]
+            scores = reduce(smaller, [function(near, b, score) for b in against])
+            scores = jnp.where(counts[np.array(front.groups)], scores, jnp.inf)
+            least.append(jnp.min(scores, 0))
+        # The running minima do not keep a NaN, so it is caught here.
+        finite = jnp.isfinite(jnp.sum(poses, (0, 1, 2)))
+        return jnp.where(finite, reduce(smaller, least), jnp.nan)
 
     return _in_blocks(block, q, world)
 
@@ -86,45 +84,24 @@ def _fronts(scene: Scene) -> list[Front]:
     for index, group in enumerate(scene.groups):
         for contact in group.contacts:
             facing[contact.b, contact.a.kind].append((contact.a, index))
-    fronts = defaultdict(list)
-    for (obstacles, _), sides in facing.items():
-        key = tuple(sides), obstacles.kind, obstacles.body
-        fronts[key].append(obstacles)
-    return [
-        Front(tuple(a for a, _ in sides), tuple(g for _, g in sides), tuple(obstacles))
-        for (sides, _, _), obstacles in fronts.items()
-    ]
+    together = defaultdict(list)
+    for (obstacle, kind), sides in facing.items():
+        key = tuple(sides), obstacle.body, (kind, obstacle.kind)
+        together[key].append(obstacle)
+    fronts = []
+    for (sides, _, kinds), obstacles in together.items():
+        rows = [(g, s.body, index) for s, index in sides for g in s.ids]
+        geoms, bodies, groups = zip(*rows, strict=True)
+        links = tuple(scene.structure.link_of[body] for body in bodies)
+        fronts.append(Front(geoms, links, groups, tuple(obstacles), kinds))
+    return fronts
 
 
-def _front_scores(
-    front: Front,
-    shapes: dict[Geoms, Shapes],
-    placed: dict[Geoms, Shapes],
-    poses: dict[int, Pose],
-    score: Score,
-) -> jax.Array:
-    """Least score of each facing geom, `[n, B]`."""
-    first = front.obstacles[0]
-    function = FUNCTIONS[front.facing[0].kind, first.kind]
-    facing = join([placed[geoms] for geoms in front.facing])
-    where = placed
-    if first.kind == "box":
-        facing, where = place_back(facing, poses[first.body]), shapes
-    facing = Shapes(*jax.lax.optimization_barrier(tuple(facing)))
-    return reduce(
-        jnp.minimum, [function(facing, where[o], score) for o in front.obstacles]
-    )
-
-
-def _counts(scene: Scene, world: World) -> list[jax.Array]:
-    """Whether each contact group counts, `[B]` bool each."""
-    counts = []
-    for index, group in enumerate(scene.groups):
-        count = ~world.ignored[index]
-        if group.held:
-            count &= reduce(jnp.logical_or, [world.held[o] for o in group.held])
-        counts.append(count)
-    return counts
+def _counts(scene: Scene, world: World) -> jax.Array:
+    """`[n_groups, B]` whether each contact group counts."""
+    needs = np.array([bool(group.held) for group in scene.groups])
+    held = [jnp.any(world.held[np.array(group.held, int)], 0) for group in scene.groups]
+    return ~world.ignored & (jnp.stack(held) | ~needs[:, None])
 
 
 def _in_blocks(function, q: jax.Array, world: World) -> jax.Array:

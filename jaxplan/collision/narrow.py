@@ -1,11 +1,12 @@
 """Signed distances between kinds of geoms, batch last, one plain expression per obstacle.
 
-Geoms that face the same obstacles are one array, `[3, n, B]`; the obstacles are a
-Python loop over a running minimum. XLA turns this into one vectorised pass over the
+Geoms that face the same obstacles are rows of one array, `[n, B]` for each coordinate,
+in the frame of the obstacles' body, where the obstacles are constants; these are a
+Python loop over a running minimum. XLA turns it into one vectorised pass over the
 cache; boolean reductions, or obstacles as an axis, are ten times slower.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from functools import reduce
 from typing import NamedTuple
 
@@ -13,8 +14,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxplan.collision.kinematics import Pose, rotation_of, turn, turn_back
-from jaxplan.scene import Geoms, Scene
+from jaxplan.collision.kinematics import rotation_of
+from jaxplan.scene import Scene
 
 
 class Score(NamedTuple):
@@ -38,80 +39,108 @@ class Score(NamedTuple):
         return distance - (radius + self.margin)
 
 
+Vector = list[jax.Array]
+"""Three coordinates, each an array of its own."""
+
+
 class Shapes(NamedTuple):
-    """Geoms of one kind: in the frame of their body (B = 1) or in the world."""
+    """Geoms of one kind, in some frame."""
 
-    centre: jax.Array
-    """`[3, n, B]` [m]"""
-    rotation: jax.Array
-    """`[3, 3, n, B]`"""
-    size: jax.Array
-    """`[3, n, 1]` MuJoCo's sizes [m]"""
+    centre: Vector
+    """Each `[n, B]` [m]; B = 1 in the frame of their own body."""
+    axes: list[Vector]
+    """The geoms' x, y and z in that frame."""
+    size: Vector
+    """MuJoCo's sizes, each `[n, 1]` [m]."""
+
+    def __len__(self) -> int:
+        return self.size[0].shape[0]
 
 
-def read(scene: Scene, geoms: Geoms) -> Shapes:
-    """Geoms in the frame of their body."""
-    ids, model = np.array(geoms.ids), scene.model
-    rotation = rotation_of(model.geom_quat[ids].T)[..., None]
+def read(scene: Scene, ids: tuple[int, ...]) -> Shapes:
+    """Geoms in the frames of their bodies."""
+    model, rows = scene.model, np.array(ids)
+    rotation = rotation_of(model.geom_quat[rows].T)[..., None]
     return Shapes(
-        model.geom_pos[ids].T[..., None], rotation, model.geom_size[ids].T[..., None]
+        list(model.geom_pos[rows].T[..., None]),
+        [list(rotation[:, k]) for k in range(3)],
+        list(model.geom_size[rows].T[..., None]),
     )
 
 
-def place(shapes: Shapes, pose: Pose) -> Shapes:
-    """Geoms of a body in the world."""
-    centre = turn(pose.rotation, shapes.centre) + pose.position[:, None]
-    columns = [turn(pose.rotation, shapes.rotation[:, j]) for j in range(3)]
-    return Shapes(centre, jnp.stack(columns, 1), shapes.size)
+def relative(shapes: Shapes, pose: jax.Array, frame: jax.Array) -> Shapes:
+    """Geoms in another frame than that of their bodies.
+
+    Args:
+        shapes: Geoms in the frames of their bodies.
+        pose: `[n, 3, 4, B]` pose of each geom's body in the world.
+        frame: `[3, 4, B]` the other frame.
+    """
+    moved = _turn(pose, shapes.centre)
+    offset = [moved[i] + pose[:, i, 3] - frame[i, 3] for i in range(3)]
+    axes = [_turn_back(frame, _turn(pose, axis)) for axis in shapes.axes]
+    return Shapes(_turn_back(frame, offset), axes, shapes.size)
 
 
-def place_back(shapes: Shapes, pose: Pose) -> Shapes:
-    """Geoms of the world in the frame of a body."""
-    centre = turn_back(pose.rotation, shapes.centre - pose.position[:, None])
-    columns = [turn_back(pose.rotation, shapes.rotation[:, j]) for j in range(3)]
-    return Shapes(centre, jnp.stack(columns, 1), shapes.size)
+def smaller(a: jax.Array, b: jax.Array | float) -> jax.Array:
+    """Minimum in one instruction, where `jnp.minimum` takes three to keep NaN.
+
+    NaN is caught once, in the poses.
+    """
+    return jnp.where(a < b, a, b)
 
 
-def join(parts: list[Shapes]) -> Shapes:
-    """Geoms of several bodies as one array."""
-    width = max(part.centre.shape[-1] for part in parts)
-
-    def along(leaves: Iterable[jax.Array], width: int) -> jax.Array:
-        wide = [jnp.broadcast_to(x, (*x.shape[:-1], width)) for x in leaves]
-        return jnp.concatenate(wide, -2)
-
-    centres, rotations, sizes = zip(*parts, strict=True)
-    return Shapes(along(centres, width), along(rotations, width), along(sizes, 1))
+def larger(a: jax.Array, b: jax.Array | float) -> jax.Array:
+    """Maximum in one instruction, see `smaller`."""
+    return jnp.where(a > b, a, b)
 
 
-def _dot(a: jax.Array, b: jax.Array) -> jax.Array:
+def _turn(pose: jax.Array, vector: Vector) -> Vector:
+    return [sum(pose[..., i, k, :] * vector[k] for k in range(3)) for i in range(3)]
+
+
+def _turn_back(pose: jax.Array, vector: Vector) -> Vector:
+    return [sum(pose[..., k, i, :] * vector[k] for k in range(3)) for i in range(3)]
+
+
+def _dot(a: Vector, b: Vector) -> jax.Array:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
+def _minus(a: Vector, b: Vector) -> Vector:
+    return [x - y for x, y in zip(a, b, strict=True)]
+
+
+def _times(factor: jax.Array, a: Vector) -> Vector:
+    return [factor * x for x in a]
+
+
+def _clip(x: jax.Array, bound: jax.Array) -> jax.Array:
+    return smaller(larger(x, -bound), bound)
+
+
 def _least(scores: Iterable[jax.Array]) -> jax.Array:
-    return reduce(jnp.minimum, scores)
+    return reduce(smaller, scores)
 
 
-def _columns(b: Shapes) -> Iterable[Shapes]:
-    """The obstacles one by one, n = 1."""
-    for j in range(b.size.shape[1]):
-        yield Shapes(
-            b.centre[:, j, None], b.rotation[:, :, j, None], b.size[:, j, None]
-        )
+def _each(b: Shapes) -> Iterator[Shapes]:
+    """The obstacles one by one, as scalars."""
+    for j in range(len(b)):
+        yield Shapes(*jax.tree.map(lambda leaf: leaf[j, 0], tuple(b)))  # noqa: B023
 
 
 def sphere_plane(a: Shapes, b: Shapes, score: Score) -> jax.Array:
     """Height above the planes."""
-    heights = (_dot(a.centre - o.centre, o.rotation[:, 2]) for o in _columns(b))
+    heights = (_dot(_minus(a.centre, o.centre), o.axes[2]) for o in _each(b))
     return score.of(_least(heights), a.size[0])
 
 
 def capsule_plane(a: Shapes, b: Shapes, score: Score) -> jax.Array:
     """Height of the lower end."""
     heights = (
-        _dot(a.centre - o.centre, o.rotation[:, 2])
-        - jnp.abs(_dot(a.rotation[:, 2], o.rotation[:, 2])) * a.size[1]
-        for o in _columns(b)
+        _dot(_minus(a.centre, o.centre), o.axes[2])
+        - jnp.abs(_dot(a.axes[2], o.axes[2])) * a.size[1]
+        for o in _each(b)
     )
     return score.of(_least(heights), a.size[0])
 
@@ -119,12 +148,9 @@ def capsule_plane(a: Shapes, b: Shapes, score: Score) -> jax.Array:
 def box_plane(a: Shapes, b: Shapes, score: Score) -> jax.Array:
     """Height of the lowest corner."""
     heights = (
-        _dot(a.centre - o.centre, o.rotation[:, 2])
-        - sum(
-            jnp.abs(_dot(a.rotation[:, k], o.rotation[:, 2])) * a.size[k]
-            for k in range(3)
-        )
-        for o in _columns(b)
+        _dot(_minus(a.centre, o.centre), o.axes[2])
+        - sum(jnp.abs(_dot(a.axes[k], o.axes[2])) * a.size[k] for k in range(3))
+        for o in _each(b)
     )
     return score.of(_least(heights), 0.0)
 
@@ -133,64 +159,60 @@ def sphere_sphere(a: Shapes, b: Shapes, score: Score) -> jax.Array:
     """Distance of centres."""
 
     def one(o: Shapes) -> jax.Array:
-        offset = a.centre - o.centre
+        offset = _minus(a.centre, o.centre)
         return score.of_squared(_dot(offset, offset), a.size[0] + o.size[0])
 
-    return _least(one(o) for o in _columns(b))
+    return _least(map(one, _each(b)))
 
 
 def sphere_capsule(a: Shapes, b: Shapes, score: Score) -> jax.Array:
     """Distance to the nearest point of the capsule's line."""
 
     def one(o: Shapes) -> jax.Array:
-        axis, offset = o.rotation[:, 2], a.centre - o.centre
-        along = jnp.clip(_dot(offset, axis), -o.size[1], o.size[1])
-        offset = offset - along * axis
+        offset = _minus(a.centre, o.centre)
+        along = _clip(_dot(offset, o.axes[2]), o.size[1])
+        offset = _minus(offset, _times(along, o.axes[2]))
         return score.of_squared(_dot(offset, offset), a.size[0] + o.size[0])
 
-    return _least(one(o) for o in _columns(b))
+    return _least(map(one, _each(b)))
 
 
 def capsule_capsule(a: Shapes, b: Shapes, score: Score) -> jax.Array:
     """Distance of segments (Ericson, Real-Time Collision Detection, 5.1.9)."""
 
     def one(o: Shapes) -> jax.Array:
-        axis_a, axis_b, offset = a.rotation[:, 2], o.rotation[:, 2], a.centre - o.centre
+        axis_a, axis_b, offset = a.axes[2], o.axes[2], _minus(a.centre, o.centre)
         across = _dot(axis_a, axis_b)
         along_a, along_b = _dot(axis_a, offset), _dot(axis_b, offset)
-        # Of parallel lines any point will do; the clamps below find its partner.
-        s = (across * along_b - along_a) / jnp.maximum(1 - across * across, 1e-9)
-        s = jnp.clip(s, -a.size[1], a.size[1])
-        t = jnp.clip(along_b + s * across, -o.size[1], o.size[1])
-        s = jnp.clip(t * across - along_a, -a.size[1], a.size[1])
-        gap = offset + s * axis_a - t * axis_b
+        # Of parallel lines any point will do; the clips below find its partner.
+        s = (across * along_b - along_a) / larger(1 - across * across, 1e-9)
+        s = _clip(s, a.size[1])
+        t = _clip(along_b + s * across, o.size[1])
+        s = _clip(t * across - along_a, a.size[1])
+        gap = _minus(offset, _minus(_times(t, axis_b), _times(s, axis_a)))
         return score.of_squared(_dot(gap, gap), a.size[0] + o.size[0])
 
-    return _least(one(o) for o in _columns(b))
+    return _least(map(one, _each(b)))
 
 
 def sphere_box(a: Shapes, b: Shapes, score: Score) -> jax.Array:
-    """Distance to boxes; `a` and `b` in the frame of the boxes' body.
+    """Distance to boxes whose axes agree up to order and sign: one turn serves all."""
+    frame = [[axis[i][0] for i in range(3)] for axis in b.axes]
+    points = [_dot(axis, a.centre) for axis in frame]
 
-    The boxes' axes agree up to order and sign, so one turn of the points serves all.
-    """
-    frame = b.rotation[:, :, 0]
-    points = turn_back(frame, a.centre)
-    middles = turn_back(frame, b.centre)
-    # Turning one such box into another only permutes its half sizes.
-    columns = [turn_back(frame, b.rotation[:, k]) for k in range(3)]
-    halves = sum(jnp.abs(columns[k]) * b.size[k] for k in range(3))
-
-    def one(j: int) -> jax.Array:
-        over = jnp.abs(points - middles[:, j, None]) - halves[:, j, None]
-        beyond = jnp.maximum(over, 0)
+    def one(o: Shapes) -> jax.Array:
+        over = []
+        for point, axis in zip(points, frame, strict=True):
+            # Which of the box's axes this is: the products are 0, 0 and 1.
+            half = sum(jnp.abs(_dot(axis, o.axes[k])) * o.size[k] for k in range(3))
+            over.append(jnp.abs(point - _dot(axis, o.centre)) - half)
+        beyond = [larger(x, 0.0) for x in over]
         rated = score.of_squared(_dot(beyond, beyond), a.size[0])
         if score.exact:
-            deepest = jnp.maximum(jnp.maximum(over[0], over[1]), over[2])
-            rated += jnp.minimum(deepest, 0)
+            rated += smaller(larger(larger(over[0], over[1]), over[2]), 0.0)
         return rated
 
-    return _least(one(j) for j in range(b.size.shape[1]))
+    return _least(map(one, _each(b)))
 
 
 FUNCTIONS: dict[tuple[str, str], Callable[[Shapes, Shapes, Score], jax.Array]] = {

@@ -4,7 +4,6 @@ from jaxplan.scene.contacts import Contact as Contact
 from jaxplan.scene.contacts import Geoms as Geoms
 from jaxplan.scene.contacts import geom_pairs as geom_pairs
 from jaxplan.scene.scene import Scene as Scene
-from jaxplan.scene.structure import Body as Body
 from jaxplan.scene.structure import Group as Group
-from jaxplan.scene.structure import Joint as Joint
+from jaxplan.scene.structure import Link as Link
 from jaxplan.scene.structure import Structure as Structure

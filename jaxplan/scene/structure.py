@@ -12,23 +12,22 @@ from jaxplan.scene.contacts import Contact, find_contacts
 SIMPLE_JOINTS = int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE)
 
 
-class Joint(NamedTuple):
-    """A hinge or slide joint."""
+class Link(NamedTuple):
+    """One step of the kinematic tree: a frame that one joint at most moves.
 
-    id: int
-    slides: bool
-    arm: int
-    """Its index in q, or -1."""
-    passive: int
-    """Its index in the passive joints, or -1."""
+    A body with several joints is several links; its frame is that of the last.
+    """
 
-
-class Body(NamedTuple):
-    """A body whose pose collision needs."""
-
-    id: int
+    body: int
+    offset: bool
+    """Starts with the body's own offset from its parent: its first link does."""
     parent: int
-    joints: tuple[Joint, ...]
+    """Row of the link that it hangs on; 0 = the world."""
+    joint: int
+    """Joint id, or -1."""
+    slides: bool
+    variable: int
+    """Its joint's index in (q, passive joints), or -1."""
     object: int
     """Its index in the movable objects, or -1."""
 
@@ -52,9 +51,11 @@ class Structure:
     objects: tuple[str, ...]
     hand: str
     groups: tuple[Group, ...]
-    bodies: tuple[Body, ...]
-    """Bodies with a geom of some pair, the hand, and their ancestors. Parents stand first,
-    and movable objects last, because the hand may hold them."""
+    links: tuple[Link, ...]
+    """Links that collision needs, row 1 first (row 0 is the world). Parents stand before
+    children, then the movable objects, which the hand may hold, then what hangs on them."""
+    link_of: dict[int, int]
+    """Row of a body's frame, by body id."""
 
 
 def read_structure(
@@ -87,9 +88,8 @@ def read_structure(
     for group in groups:
         needed |= {side.body for contact in group.contacts for side in contact}
     needed = {a for body in needed for a in _line(model, body)}
-    order = sorted(needed, key=lambda b: (model.body_rootid[b] in free, b))
-    tree = tuple(_body(model, body, joints, passive, objects) for body in order)
-    return Structure(model, joints, passive, objects, hand, groups, tree)
+    links, link_of = _links(model, needed, (*joints, *passive), objects)
+    return Structure(model, joints, passive, objects, hand, groups, links, link_of)
 
 
 def known(name: str, kind: str, names: Sequence[str]) -> str:
@@ -140,28 +140,34 @@ def _groups(
     return tuple(groups)
 
 
-def _body(
+def _links(
     model: mujoco.MjModel,
-    body: int,
-    joints: tuple[str, ...],
-    passive: tuple[str, ...],
+    needed: set[int],
+    variables: tuple[str, ...],
     objects: tuple[str, ...],
-) -> Body:
-    parent = int(model.body_parentid[body])
-    if model.body(body).name in objects:
-        return Body(body, parent, (), objects.index(model.body(body).name))
-    found = []
-    first = model.body_jntadr[body]
-    for j in range(first, first + model.body_jntnum[body]):
-        name = model.joint(j).name
-        if model.jnt_type[j] not in SIMPLE_JOINTS:
-            raise ValueError(f"ball joint {name!r} is not supported")
-        slides = bool(model.jnt_type[j] == mujoco.mjtJoint.mjJNT_SLIDE)
-        arm = joints.index(name) if name in joints else -1
-        found.append(
-            Joint(int(j), slides, arm, -1 if arm >= 0 else passive.index(name))
-        )
-    return Body(body, parent, tuple(found), -1)
+) -> tuple[tuple[Link, ...], dict[int, int]]:
+    """Links of the bodies that are needed, and the row of each body."""
+    free = {int(model.body(name).id): i for i, name in enumerate(objects)}
+    rank = {b: 1 if b in free else 2 * (model.body_rootid[b] in free) for b in needed}
+    links: list[Link] = []
+    row = {0: 0}
+    for body in sorted(needed, key=lambda b: (rank[b], b)):
+        parent = row[0 if body in free else int(model.body_parentid[body])]
+        first = model.body_jntadr[body]
+        ids = range(first, first + model.body_jntnum[body])
+        if body in free or not ids:
+            links.append(Link(body, True, parent, -1, False, -1, free.get(body, -1)))
+        for j in ids if body not in free else ():
+            name = model.joint(j).name
+            if model.jnt_type[j] not in SIMPLE_JOINTS:
+                raise ValueError(f"ball joint {name!r} is not supported")
+            slides = bool(model.jnt_type[j] == mujoco.mjtJoint.mjJNT_SLIDE)
+            above = parent if j == first else len(links)
+            links.append(
+                Link(body, j == first, above, int(j), slides, variables.index(name), -1)
+            )
+        row[body] = len(links)
+    return tuple(links), row
 
 
 def _simple_joints(model: mujoco.MjModel, body: int) -> list[int]:
