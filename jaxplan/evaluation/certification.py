@@ -1,0 +1,59 @@
+"""What C MuJoCo says about planned paths and executed motions."""
+
+from collections import Counter
+
+import jax
+import numpy as np
+
+from jaxplan.collision import certify
+from jaxplan.motion import MotionPlanner
+from jaxplan.planning import Status
+from jaxplan.rollout import Phase
+
+
+class Certification:
+    """Listens to the outer loop and certifies every path, and every motion before it runs.
+
+    The resolution is 0.01 rad; contacts deeper than 1 mm are refused.
+    """
+
+    def __init__(self, planner: MotionPlanner) -> None:
+        self._scene = planner.scene
+        self.statuses: Counter[str] = Counter()
+        self.refused: list[str] = []
+        self.invalid: list[str] = []
+
+    def __call__(self, phase: Phase) -> None:
+        """Certifies a round."""
+        result = phase.motion.result
+        for e in phase.episodes:
+            self.statuses[Status(result.status[e]).name] += 1
+            world = jax.tree.map(lambda leaf, e=e: leaf[e], phase.worlds)
+            path = result.path[e, : result.path_length[e]]
+            for waypoints, said in (
+                (path, self.refused),
+                (phase.motion.q[e], self.invalid),
+            ):
+                if len(waypoints) < 2:
+                    continue
+                certificate = certify(self._scene, world, np.asarray(waypoints, float))
+                if not certificate.valid and certificate.pair is not None:
+                    pair, depth = (
+                        " and ".join(certificate.pair),
+                        -1000 * certificate.clearance,
+                    )
+                    said.append(
+                        f"phase {phase.number + 1}: {pair}, {depth:.1f} mm deep"
+                    )
+
+    def summary(self) -> dict:
+        """Counts, and what was refused."""
+        problems = sum(self.statuses.values())
+        return {
+            "problems": problems,
+            "solved": self.statuses[Status.SOLVED.name],
+            "statuses": dict(self.statuses),
+            "paths_refused": len(self.refused),
+            "motions_invalid": len(self.invalid),
+            "examples": (self.refused + self.invalid)[:20],
+        }
