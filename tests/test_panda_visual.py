@@ -6,7 +6,8 @@ import mujoco
 import numpy as np
 import pytest
 
-from jaxplan.scene.panda_visual import add_visuals, box, lathe
+from jaxplan.scene.panda_visual import add_visuals
+from jaxplan.scene.surface import box, lathe
 
 
 @pytest.fixture(scope="module")
