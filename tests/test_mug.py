@@ -3,12 +3,15 @@
 import mujoco
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
+from jaxplan.config import PlannerConfig
 from jaxplan.tasks.mug import scene
 from jaxplan.tasks.mug.expert import Expert, Toggle
 from jaxplan.tasks.mug.kinematics import InverseKinematics
 from jaxplan.tasks.mug.mug import MugShape, collision_boxes, planning_spheres
-from jaxplan.tasks.mug.task import RANGE, MugTask, sample_pose
+from jaxplan.tasks.mug.poses import RANGE, sample_pose
+from jaxplan.tasks.mug.task import MugTask
 
 
 @pytest.fixture(scope="module")
@@ -49,10 +52,14 @@ def test_reset_is_reproducible_and_in_range(task):
     assert sides == {False, True}, "the handle lies on either side"
 
 
-def test_a_settled_mug_is_at_rest(task):
-    task.reset(range(8), range(100, 108))
-    speeds = [np.linalg.norm(task.sim.data[e].qvel[9:12]) for e in range(8)]
-    assert max(speeds) < 0.01
+def test_a_settled_mug_stays_where_it_is(task):
+    """At most it still rocks on its handle: 2 mm in the next second."""
+    lanes = range(8)
+    task.reset(lanes, range(100, 108))
+    before = np.array([task.mug(e)[:3, 3] for e in lanes])
+    task.wait(lanes, 1.0)
+    after = np.array([task.mug(e)[:3, 3] for e in lanes])
+    assert np.linalg.norm(after - before, axis=1).max() < 2e-3
 
 
 def test_samples_fill_the_range():
@@ -67,30 +74,20 @@ def test_samples_fill_the_range():
 
 
 def test_planning_spheres_cover_the_mug():
-    """No corner of a collision box sticks out of the spheres of the held mug by more than 1 mm."""
+    """No corner of a box sticks out of the held mug's spheres by half of the planner's margin."""
     shape = MugShape()
     spheres = planning_spheres(shape)
-    centres, radii = (
-        np.array([c for c, _ in spheres]),
-        np.array([r for _, r in spheres]),
-    )
+    centres, radii = map(np.array, zip(*spheres, strict=True))
     for name, centre, half, angle in collision_boxes(shape):
         if name.startswith("bottom"):
             continue  # the mug's floor lies inside its wall
         corners = np.array(np.meshgrid(*[[-1, 1]] * 3)).reshape(3, -1).T * half
-        turn = np.array(
-            [
-                [np.cos(angle), -np.sin(angle), 0],
-                [np.sin(angle), np.cos(angle), 0],
-                [0, 0, 1],
-            ]
-        )
-        corners = corners @ turn.T + centre
+        corners = Rotation.from_euler("z", angle).apply(corners) + centre
         outside = np.linalg.norm(corners[:, None] - centres, axis=2) - radii
         if name.startswith("wall"):  # the inner corners need no cover
             corner_radius = np.hypot(corners[:, 0], corners[:, 1])
             outside = outside[corner_radius > shape.radius - shape.wall / 2]
-        assert outside.min(axis=1).max() < 1e-3, name
+        assert outside.min(axis=1).max() < PlannerConfig().margin / 2, name
 
 
 def test_inverse_kinematics_reaches_its_pose(model):
@@ -104,9 +101,8 @@ def test_inverse_kinematics_reaches_its_pose(model):
         assert error < 1e-3
         reached, _ = ik.pose(q)
         np.testing.assert_allclose(reached, position, atol=1e-3)
-        assert np.all(q >= model.jnt_range[:7, 0]) and np.all(
-            q <= model.jnt_range[:7, 1]
-        )
+        assert np.all(q >= model.jnt_range[:7, 0])
+        assert np.all(q <= model.jnt_range[:7, 1])
 
 
 def test_labels_do_not_jump(model):
@@ -142,11 +138,12 @@ def test_the_judge_names_what_is_wrong(task):
         mujoco.mj_forward(task.model, data)
         return task.failure(0)
 
-    inside = scene.BOX_POSITION + [0, 0, scene.BOX_FLOOR + task.shape.height / 2]
-    assert place(inside) is None
-    assert "outside" in place(inside + [0.2, 0, 0])
-    assert "upright" in place(inside, (0.7071, 0.7071, 0, 0))
-    data.qpos[9:16] = [*inside, 1, 0, 0, 0]
+    x, y, _ = scene.BOX_POSITION
+    z = scene.BOX_FLOOR + task.shape.height / 2
+    assert place([x, y, z]) is None
+    assert "outside" in place([x + 0.2, y, z])
+    assert "upright" in place([x, y, z], (0.7071, 0.7071, 0, 0))
+    data.qpos[9:16] = [x, y, z, 1, 0, 0, 0]
     data.qvel[9] = 0.1
     assert "rest" in task.failure(0)
 
@@ -155,17 +152,23 @@ def test_a_grasp_holds_the_mug(task):
     """Lifted by the rim, the mug slips less than a millimetre."""
     task.reset([0], [3])
     expert = Expert(task.model)
-    for k, q in enumerate(expert.keyframes(task.mug(0), task.sim.q(0), False).q):
-        s = np.linspace(0, 1, 150)[:, None]
-        start = task.sim.q(0)
-        task.follow([0], [start + (10 * s**3 - 15 * s**4 + 6 * s**5) * (q - start)])
-        assert task.arrived(0, q), f"keyframe {k}"
+    for q in expert.keyframes(task.mug(0), task.sim.q(0), False).q:
+        move(task, q)
+        assert task.arrived(0, q)
     task.toggle([0], [True])
     assert task.held(0)
-    hand = np.linalg.inv(task.hand_pose(task.sim.data[0])) @ task.mug(0)
-    q, start = expert.keyframes(task.mug(0), task.sim.q(0), True).q[0], task.sim.q(0)
-    s = np.linspace(0, 1, 150)[:, None]
-    task.follow([0], [start + (10 * s**3 - 15 * s**4 + 6 * s**5) * (q - start)])
+    before = mug_in_hand(task)
+    move(task, expert.keyframes(task.mug(0), task.sim.q(0), True).q[0])
     assert task.mug(0)[2, 3] > 0.15
-    slip = np.linalg.inv(task.hand_pose(task.sim.data[0])) @ task.mug(0) - hand
-    assert np.linalg.norm(slip[:3, 3]) < 1e-3
+    assert np.linalg.norm((mug_in_hand(task) - before)[:3, 3]) < 1e-3
+
+
+def move(task, q):
+    """A straight motion of 1.5 s, from rest to rest."""
+    s = np.linspace(0, 1, 150)[:, None]
+    start = task.sim.q(0)
+    task.follow([0], [start + (10 * s**3 - 15 * s**4 + 6 * s**5) * (q - start)])
+
+
+def mug_in_hand(task):
+    return np.linalg.inv(task.hand_pose(task.sim.data[0])) @ task.mug(0)

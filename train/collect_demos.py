@@ -16,7 +16,7 @@ import tyro
 from tqdm import tqdm
 
 from jaxplan import data
-from jaxplan.config import DemonstrationConfig, PlannerConfig, RolloutConfig
+from jaxplan.config import DemonstrationConfig, PlannerConfig
 
 
 @dataclass(frozen=True)
@@ -50,25 +50,21 @@ class Collector:
         self._policy = ExpertPolicy(self._task, args.demonstration)
 
     def shard(self, index: int) -> tuple[int, int]:
-        """Makes and writes shard `index`; returns how many of its episodes succeeded, and their number."""
+        """Makes and writes shard `index`; returns how many episodes succeeded, and of how many."""
         from jaxplan.rollout import Targets, rollout
         from jaxplan.tasks.mug.demonstrate import Recorder
 
         args, policy = self._args, self._policy
-        seeds = range(
-            args.first_seed + index * args.shard_size,
-            args.first_seed + (index + 1) * args.shard_size,
-        )
+        first = args.first_seed + index * args.shard_size
+        seeds = range(first, first + args.shard_size)
         policy.reset(seeds)
         recorder = Recorder(self._task, policy, seeds, args.demonstration)
         records = rollout(
             self._task,
             seeds,
-            lambda o, e: Targets(*policy(o, e)),
+            lambda observation, episodes: Targets(*policy(observation, episodes)),
             self._planner,
-            None,
-            RolloutConfig(),
-            recorder,
+            listen=recorder,
         )
         data.write_shard(data.shard_path(args.out, index), recorder.shard(records))
         return sum(record.success for record in records), len(records)
@@ -89,28 +85,34 @@ def _shard(index: int) -> tuple[int, int]:
 
 def main(args: Args) -> None:
     """Collects what is missing."""
-    if args.episodes < 1 or args.shard_size < 1 or args.workers < 1:
-        raise ValueError(
-            f"nothing to do: {args.episodes} episodes, {args.shard_size} a shard, {args.workers} workers"
-        )
+    for name in ("episodes", "shard_size", "workers"):
+        if getattr(args, name) < 1:
+            raise ValueError(f"{name} {getattr(args, name)}: expected at least 1")
     count = -(-args.episodes // args.shard_size)
+    if not 0 <= args.first_seed <= 2**31 - count * args.shard_size:
+        raise ValueError(f"first_seed {args.first_seed}: seeds are 0 to {2**31 - 1}")
     settings = {
-        "task": "mug", "first_seed": args.first_seed, "shard_size": args.shard_size, "camera": args.camera,
+        "task": "mug",
+        "first_seed": args.first_seed,
+        "shard_size": args.shard_size,
+        "camera": args.camera,
         "demonstration": dataclasses.asdict(args.demonstration),
-    }  # fmt: skip
+    }
     args.out.mkdir(parents=True, exist_ok=True)
     missing = data.missing_shards(args.out, count, settings)
-    if not missing:
-        data.write_manifest(args.out, settings)
-        return
     data.write_manifest(args.out, settings)
+    if missing:
+        _collect(args, missing)
+        data.write_manifest(args.out, settings)
+
+
+def _collect(args: Args, missing: list[int]) -> None:
+    """Makes shards in parallel, with a progress bar."""
     spawn = multiprocessing.get_context("spawn")
     workers = min(args.workers, len(missing))
     solved = made = 0
     with (
-        ProcessPoolExecutor(
-            workers, spawn, initializer=_start, initargs=(args,)
-        ) as pool,
+        ProcessPoolExecutor(workers, spawn, _start, (args,)) as pool,
         tqdm(total=len(missing) * args.shard_size, unit="episode") as bar,
     ):
         for done in as_completed([pool.submit(_shard, index) for index in missing]):
@@ -118,12 +120,11 @@ def main(args: Args) -> None:
             solved, made = solved + successes, made + episodes
             bar.update(episodes)
             bar.set_postfix_str(f"{solved}/{made} succeeded")
-    data.write_manifest(args.out, settings)
 
 
 if __name__ == "__main__":
     try:
         main(tyro.cli(Args))
-    except (ValueError, RuntimeError) as error:
+    except (ValueError, RuntimeError, OSError) as error:
         print(f"error: {error}", file=sys.stderr)
         sys.exit(2)

@@ -82,8 +82,12 @@ class Camera:
             if scene.ngeom == scene.maxgeom:
                 break
             mujoco.mjv_initGeom(
-                scene.geoms[scene.ngeom], mujoco.mjtGeom.mjGEOM_SPHERE, np.full(3, mark.radius),
-                np.asarray(mark.position, float), np.eye(3).ravel(), np.asarray(mark.rgba, np.float32),
-            )  # fmt: skip
+                scene.geoms[scene.ngeom],
+                type=mujoco.mjtGeom.mjGEOM_SPHERE,
+                size=np.full(3, mark.radius),
+                pos=np.asarray(mark.position, float),
+                mat=np.eye(3).ravel(),
+                rgba=np.asarray(mark.rgba, np.float32),
+            )
             scene.ngeom += 1
         return self._renderer.render()

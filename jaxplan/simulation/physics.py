@@ -73,13 +73,9 @@ class Simulator:
             episode, q = job
             data = self.data[episode]
             # Damping makes a position servo lag by kv / kp: the velocity is fed forward.
-            command = (
-                q + self._lag * np.gradient(q, CONTROL_PERIOD, axis=0)
-                if len(q) > 1
-                else q
-            )
-            for command_k in command:
-                data.ctrl[:7] = command_k
+            velocity = np.gradient(q, CONTROL_PERIOD, axis=0) if len(q) > 1 else 0.0
+            for command in q + self._lag * velocity:
+                data.ctrl[:7] = command
                 self._advance(episode)
             data.ctrl[:7] = q[-1]
             self._wait(episode, settle)
@@ -98,9 +94,8 @@ class Simulator:
             episode, target = job
             data = self.data[episode]
             start = data.ctrl[7:9].copy()
-            count = int(
-                np.ceil(np.abs(target - start).max() / (GRIPPER.speed * CONTROL_PERIOD))
-            )
+            stride = GRIPPER.speed * CONTROL_PERIOD
+            count = int(np.ceil(np.abs(target - start).max() / stride))
             for s in np.linspace(0, 1, count + 1)[1:]:
                 data.ctrl[7:9] = start + s * (target - start)
                 self._advance(episode)
@@ -112,12 +107,9 @@ class Simulator:
         """Releases: a little near the object, or all the way (`wide`)."""
         if wide:
             self.move_fingers(episodes, [GRIPPER.open] * len(episodes), settle=0.0)
-        else:
-            widths = [
-                min(GRIPPER.open, self.fingers(e).mean() + GRIPPER.release)
-                for e in episodes
-            ]
-            self.move_fingers(episodes, widths)
+            return
+        fingers = [self.fingers(e).mean() + GRIPPER.release for e in episodes]
+        self.move_fingers(episodes, [min(GRIPPER.open, f) for f in fingers])
 
     def close(self, episodes: Sequence[int]) -> None:
         """Closes on whatever is between the pads; friction holds it."""

@@ -1,1 +1,1 @@
-"""TODO"""
+"""Tasks: a folder each, with its scene, its expert and its judge."""

@@ -1,1 +1,1 @@
-"""TODO"""
+"""The paper's task: a mug that lies on the table is put upright, then into a box."""

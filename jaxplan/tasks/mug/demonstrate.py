@@ -6,6 +6,8 @@ always the expert's clean keyframes.
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -13,6 +15,33 @@ from jaxplan.config import DemonstrationConfig
 from jaxplan.data import PATH_POINTS, Shard, as_shard
 from jaxplan.tasks.mug.expert import Expert, Keyframes, Toggle
 from jaxplan.tasks.mug.task import MugTask, Observation
+
+
+class Label(NamedTuple):
+    """What the predictor should have said."""
+
+    q_toggle: np.ndarray
+    """(7,) [rad]."""
+    gripper_toggle: int
+    """0 open, 1 closed: the mode after the toggle."""
+    q_goal: np.ndarray
+    """(7,) [rad]."""
+
+
+FRAME = (*Observation._fields, *Label._fields, "toggle", "seed")
+"""A shard's columns that each frame fills."""
+
+
+@dataclass
+class _Script:
+    """How far an episode has come on the expert's way."""
+
+    rng: np.random.Generator
+    noisy: bool
+    keyframes: Keyframes | None = None
+    """To the next toggle; None before the first look."""
+    next: int = 0
+    """The keyframe that the present phase leads to."""
 
 
 class ExpertPolicy:
@@ -26,71 +55,77 @@ class ExpertPolicy:
     ) -> None:
         self._task, self._config = task, config
         self._expert = Expert(task.model, task.shape)
-        self._keyframes: dict[int, Keyframes] = {}
-        self._next: dict[int, int] = {}
-        self._rng: dict[int, np.random.Generator] = {}
-        self._noisy: dict[int, bool] = {}
+        self._scripts: list[_Script] = []
 
     def reset(self, seeds: Sequence[int]) -> None:
-        """Forgets the last batch."""
-        self._keyframes, self._next = {}, {}
-        self._rng = {
-            e: np.random.default_rng([seed, 1]) for e, seed in enumerate(seeds)
-        }
-        self._noisy = {
-            e: bool(rng.random() < self._config.noisy_episodes)
-            for e, rng in self._rng.items()
-        }
+        """Begins a batch, one episode per seed; a seed says whether its episode is noisy."""
+        self._scripts = []
+        for seed in seeds:
+            rng = np.random.default_rng([seed, 1])
+            noisy = bool(rng.random() < self._config.noisy_episodes)
+            self._scripts.append(_Script(rng, noisy))
 
-    def __call__(self, observation: Observation, episodes: Sequence[int]):
-        """(q_toggle, gripper_toggle, q_goal) to drive to: the labels, with a noisy episode's noise."""
+    def __call__(
+        self, observation: Observation, episodes: Sequence[int]
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """(q_toggle, gripper_toggle, q_goal) to drive to: labels, with a noisy episode's noise."""
         rows = []
         for e, q in zip(episodes, observation.q, strict=True):
             self._advance(e, q)
-            label = self.label(e)
-            q_toggle, q_goal = label[0].copy(), label[2].copy()
-            if self._noisy[e]:
-                last = self._next[e] == len(self._keyframes[e].q) - 1
-                scale = (
-                    self._config.toggle_noise if last else self._config.keyframe_noise
-                )
-                q_goal += self._rng[e].normal(0, scale, 7)
-                q_toggle = q_goal if last else q_toggle
-            rows.append((q_toggle, label[1], q_goal))
-        q_toggle, gripper_toggle, q_goal = (
-            np.array(column) for column in zip(*rows, strict=True)
-        )
+            rows.append(self._perturbed(e))
+        q_toggle, gripper_toggle, q_goal = map(np.array, zip(*rows, strict=True))
         return q_toggle, gripper_toggle, q_goal
 
-    def label(self, episode: int) -> tuple[np.ndarray, int, np.ndarray]:
-        """Clean (q_toggle, gripper_toggle, q_goal) of the episode's present phase."""
-        keyframes = self._keyframes[episode]
-        return (
-            keyframes.q[-1],
-            int(not self._task.closed[episode]),
-            keyframes.q[self._next[episode]],
-        )
+    def label(self, episode: int) -> Label:
+        """The clean label of the episode's present phase."""
+        keyframes = self._keyframes(episode)
+        closed = bool(self._task.closed[episode])
+        q_goal = keyframes.q[self._scripts[episode].next]
+        return Label(keyframes.q[-1], int(not closed), q_goal)
 
     def toggle(self, episode: int) -> Toggle:
         """Which toggle comes next."""
-        return self._keyframes[episode].toggle
+        return self._keyframes(episode).toggle
+
+    def _keyframes(self, episode: int) -> Keyframes:
+        keyframes = self._scripts[episode].keyframes
+        assert keyframes is not None, "asked before the episode was observed"
+        return keyframes
 
     def _advance(self, episode: int, q: np.ndarray) -> None:
-        """To the next keyframe, or to a new stage once the gripper has toggled."""
-        closed = bool(self._task.closed[episode])
-        keyframes = self._keyframes.get(episode)
-        if keyframes is not None and (keyframes.toggle % 2 == 1) == closed:
-            if self._next[episode] + 1 < len(keyframes.q):
-                self._next[episode] += 1
+        """To the next keyframe, or to the next toggle's once the gripper has toggled."""
+        script, closed = self._scripts[episode], bool(self._task.closed[episode])
+        keyframes = script.keyframes
+        if keyframes is None or (keyframes.toggle % 2 == 1) != closed:
+            mug = self._task.mug(episode)
+            script.keyframes = self._expert.keyframes(mug, q.astype(float), closed)
+            script.next = 0
         else:
-            self._keyframes[episode] = self._expert.keyframes(
-                self._task.mug(episode), q.astype(float), closed
-            )
-            self._next[episode] = 0
+            script.next = min(script.next + 1, len(keyframes.q) - 1)
+
+    def _perturbed(self, episode: int) -> Label:
+        """The label, or in a noisy episode a place beside it."""
+        script, label = self._scripts[episode], self.label(episode)
+        if not script.noisy:
+            return label
+        at_toggle = script.next == len(self._keyframes(episode).q) - 1
+        config = self._config
+        scale = config.toggle_noise if at_toggle else config.keyframe_noise
+        q_goal = label.q_goal + script.rng.normal(0, scale, 7)
+        return label._replace(
+            q_toggle=q_goal if at_toggle else label.q_toggle, q_goal=q_goal
+        )
 
 
 class Recorder:
-    """Listens to the loop and keeps frames with their labels."""
+    """Listens to the loop and keeps frames with their labels.
+
+    Args:
+        task: Where the episodes run.
+        policy: Who drives them; its labels are kept.
+        seeds: One per episode.
+        config: From where else the camera looks.
+    """
 
     def __init__(
         self,
@@ -99,83 +134,67 @@ class Recorder:
         seeds: Sequence[int],
         config: DemonstrationConfig,
     ) -> None:
-        self._task, self._policy, self._seeds, self._config = (
-            task,
-            policy,
-            seeds,
-            config,
-        )
-        self._rng = {
-            e: np.random.default_rng([seed, 2]) for e, seed in enumerate(seeds)
-        }
-        self._frames: dict[int, list[dict]] = {e: [] for e in range(len(seeds))}
-        self._paths: dict[int, list[np.ndarray]] = {e: [] for e in range(len(seeds))}
+        self._task, self._policy, self._config = task, policy, config
+        self._seeds = seeds
+        self._rng = [np.random.default_rng([seed, 2]) for seed in seeds]
+        self._frames: list[list[dict]] = [[] for _ in seeds]
+        self._paths: list[list[np.ndarray]] = [[] for _ in seeds]
 
     def __call__(self, phase) -> None:
-        """Keeps this round's frames: each phase's start, and arms near it and on its way."""
+        """Keeps a round's frames (`rollout.Phase`): its start, arms near it and on the way."""
+        config = self._config
         for row, e in enumerate(phase.episodes):
             if e not in phase.executed or self._task.in_terminal_region(e):
                 continue
             q = phase.motion.q[e]
-            observation = Observation(
-                *(column[row : row + 1] for column in phase.observation)
-            )
-            self._keep(e, observation, q)
+            self._keep(e, Observation(*(x[[row]] for x in phase.observation)), q)
             first = self._policy.toggle(e) == Toggle.GRASP1
-            config = self._config
             for _ in range(config.perturbed_first if first else config.perturbed):
-                near = q[0] + self._rng[e].normal(0, config.frame_noise, 7)
-                self._keep(
-                    e,
-                    self._task.observe_at(e, near),
-                    np.concatenate([near[None], q[len(q) // 8 :]]),
-                )
+                self._keep_beside(e, q, at=0, rejoin=len(q) // 8)
             if first:
-                k = int(self._rng[e].uniform(0.1, 0.7) * len(q))
-                near = q[k] + self._rng[e].normal(0, config.frame_noise, 7)
-                self._keep(
-                    e,
-                    self._task.observe_at(e, near),
-                    np.concatenate([near[None], q[k + 1 :]]),
-                )
-
-    def _keep(self, episode: int, observation: Observation, q: np.ndarray) -> None:
-        q_toggle, gripper_toggle, q_goal = self._policy.label(episode)
-        self._frames[episode].append({
-            "image": observation.image[0], "q": observation.q[0], "gripper": observation.gripper[0],
-            "q_toggle": q_toggle, "gripper_toggle": gripper_toggle, "q_goal": q_goal,
-            "toggle": int(self._policy.toggle(episode)), "seed": self._seeds[episode],
-        })  # fmt: skip
-        # A noisy episode was driven beside the label; the sampler learns the way to the label.
-        self._paths[episode].append(
-            np.concatenate([q[: max(1, len(q) * 7 // 8)], q_goal[None]])
-        )
+                at = int(self._rng[e].uniform(0.1, 0.7) * len(q))
+                self._keep_beside(e, q, at, rejoin=at + 1)
 
     def shard(self, records: Sequence) -> Shard:
         """The batch's frames in the order of seeds; failed episodes leave only their record."""
-        frames, paths = [], []
-        for e, record in enumerate(records):
-            if record.success:
-                frames += self._frames[e]
-                paths += self._paths[e]
-        resampled = [_resample(path) for path in paths]
-        columns = {key: [frame[key] for frame in frames] for key in (
-            "image", "q", "gripper", "q_toggle", "gripper_toggle", "q_goal", "toggle", "seed",
-        )}  # fmt: skip
+        kept = [e for e, record in enumerate(records) if record.success]
+        frames = [frame for e in kept for frame in self._frames[e]]
+        paths = [_resample(path) for e in kept for path in self._paths[e]]
         return as_shard(
-            **columns,
-            path=np.arange(len(frames)), arc=np.zeros(len(frames)),
-            path_q=[q for q, _ in resampled], path_length=[length for _, length in resampled],
+            **{name: [frame[name] for frame in frames] for name in FRAME},
+            path=np.arange(len(frames)),
+            arc=np.zeros(len(frames)),
+            path_q=[q for q, _ in paths],
+            path_length=[length for _, length in paths],
             episode_seed=[record.seed for record in records],
             episode_success=[record.success for record in records],
             episode_failure=[record.failure or "" for record in records],
-        )  # fmt: skip
+        )
+
+    def _keep_beside(self, episode: int, q: np.ndarray, at: int, rejoin: int) -> None:
+        """A frame from an arm near `q[at]`, whose way goes on from `q[rejoin]`."""
+        near = q[at] + self._rng[episode].normal(0, self._config.frame_noise, 7)
+        seen = self._task.observe_at(episode, near)
+        self._keep(episode, seen, np.concatenate([near[None], q[rejoin:]]))
+
+    def _keep(self, episode: int, seen: Observation, q: np.ndarray) -> None:
+        """A frame (an observation of one arm), its label, and its way `q` (T, 7) [rad]."""
+        label = self._policy.label(episode)
+        values = (
+            *(column[0] for column in seen),
+            *label,
+            int(self._policy.toggle(episode)),
+            self._seeds[episode],
+        )
+        self._frames[episode].append(dict(zip(FRAME, values, strict=True)))
+        # A noisy episode was driven beside the label; the sampler learns the way to the label.
+        most = q[: max(1, len(q) * 7 // 8)]
+        self._paths[episode].append(np.concatenate([most, label.q_goal[None]]))
 
 
 def _resample(path: np.ndarray) -> tuple[np.ndarray, float]:
     """`PATH_POINTS` points uniform in arc length, and the length [rad]."""
-    arc = np.concatenate(
-        [[0.0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))]
-    )
+    steps = np.linalg.norm(np.diff(path, axis=0), axis=1)
+    arc = np.concatenate([[0.0], np.cumsum(steps)])
     at = np.linspace(0, arc[-1], PATH_POINTS)
     return np.stack([np.interp(at, arc, joint) for joint in path.T], 1), float(arc[-1])

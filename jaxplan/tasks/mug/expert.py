@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import mujoco
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
 from jaxplan.tasks.mug.kinematics import RETREAT, InverseKinematics
@@ -53,6 +54,10 @@ class Keyframes(NamedTuple):
     """Largest pose error that inverse kinematics left [m + rad]."""
 
 
+Approach = tuple[list[np.ndarray], np.ndarray]
+"""Poses (4, 4) of the tool centre point, the toggle's last, and the reference of their IK [rad]."""
+
+
 class Expert:
     """Answers what the predictor learns to answer, from the state that the predictor never sees."""
 
@@ -66,10 +71,8 @@ class Expert:
             return Toggle.GRASP2 if mug[2, 2] > 0.9 else Toggle.GRASP1
         position, _ = self._ik.pose(q)
         inside = mug[:3, :3].T @ (position - mug[:3, 3])
-        by_handle = (
-            np.hypot(inside[0], inside[1])
-            > (self._shape.radius + self._shape.handle_grip[0]) / 2
-        )
+        between = (self._shape.radius + self._shape.handle_grip[0]) / 2
+        by_handle = np.hypot(inside[0], inside[1]) > between
         return Toggle.RELEASE2 if by_handle else Toggle.RELEASE1
 
     def keyframes(self, mug: np.ndarray, q: np.ndarray, closed: bool) -> Keyframes:
@@ -77,7 +80,7 @@ class Expert:
 
         Args:
             mug: Pose of the mug in the world, (4, 4).
-            q: Joints at the start [rad]; while the gripper is closed they tell how the mug is held.
+            q: Joints at the start [rad]; with a closed gripper they tell how the mug is held.
             closed: Whether the gripper is closed.
         """
         toggle = self.next_toggle(mug, q, closed)
@@ -95,7 +98,7 @@ class Expert:
             toggle, np.stack([s[0] for s in solved]), max(s[1] for s in solved)
         )
 
-    def _grasp_rim(self, mug, q):
+    def _grasp_rim(self, mug: np.ndarray, q: np.ndarray) -> Approach:
         axis = mug[:3, 2] * [1, 1, 0]
         axis /= np.linalg.norm(axis)
         side = np.cross(UP, axis)
@@ -107,25 +110,20 @@ class Expert:
         )
         contact[2] = shape.radius
         approach = -axis * np.cos(PITCH) - UP * np.sin(PITCH)
-        grasp = _pose(
-            contact, np.stack([np.cross(-side, approach), -side, approach], 1)
-        )
-        return [
-            _moved(grasp, -0.11 * approach + [0, 0, 0.05]),
-            _moved(grasp, -0.06 * approach),
-            grasp,
-        ], Q_RIM
+        axes = np.stack([np.cross(-side, approach), -side, approach], 1)
+        grasp = _pose(contact, axes)
+        transit = _moved(grasp, -0.11 * approach + [0, 0, 0.05])
+        return [transit, _moved(grasp, -0.06 * approach), grasp], Q_RIM
 
-    def _put_upright(self, mug, q):
+    def _put_upright(self, mug: np.ndarray, q: np.ndarray) -> Approach:
         turned = self._handle_is_right(mug, q)
-        target = _pose(
-            [*STAGING, self._shape.height / 2 + DROP], _yaw(STAGING_YAWS[turned])
-        )
+        place = [*STAGING, self._shape.height / 2 + DROP]
+        target = _pose(place, _yaw(STAGING_YAWS[turned]))
         release = self._hand_for(mug, q, target)
         lift = _moved(_pose(*self._ik.pose(q)), [0, 0, 0.18])
         return [lift, _moved(release, [0, 0, 0.05]), release], Q_RIM
 
-    def _grasp_handle(self, mug, q):
+    def _grasp_handle(self, mug: np.ndarray, q: np.ndarray) -> Approach:
         radius, height = self._shape.handle_grip
         out = mug[:3, 0] * [1, 1, 0]
         out /= np.linalg.norm(out)
@@ -136,36 +134,39 @@ class Expert:
         frames = [_moved(grasp, [0, 0, 0.16]), _moved(grasp, [0, 0, 0.06]), grasp]
         hand = _pose(*self._ik.pose(q))
         at_rim = hand[2, 2] > -0.9 and np.linalg.norm(hand[:3, 3] - mug[:3, 3]) < 0.10
-        return (
-            [_moved(hand, -RETREAT * hand[:3, 2]), *frames] if at_rim else frames
-        ), Q_HOME
+        if at_rim:
+            frames.insert(0, _moved(hand, -RETREAT * hand[:3, 2]))
+        return frames, Q_HOME
 
-    def _put_in_box(self, mug, q):
-        middle = BOX_POSITION + [0, 0, BOX_FLOOR + self._shape.height / 2 + DROP]
-        release = self._hand_for(
-            mug, q, _pose(middle, _yaw(BOX_YAWS[int(mug[1, 0] > 0)]))
+    def _put_in_box(self, mug: np.ndarray, q: np.ndarray) -> Approach:
+        place = _moved(
+            _pose(BOX_POSITION, _yaw(BOX_YAWS[int(mug[1, 0] > 0)])),
+            [0, 0, BOX_FLOOR + self._shape.height / 2 + DROP],
         )
+        release = self._hand_for(mug, q, place)
         lift = _moved(_pose(*self._ik.pose(q)), [0, 0, 0.12])
         return [lift, _moved(release, [0, 0, 0.09]), release], Q_HOME
 
-    def _handle_is_right(self, mug, q) -> int:
+    def _handle_is_right(self, mug: np.ndarray, q: np.ndarray) -> int:
         """Whether the handle lies on the other side of the axis than the rim that is held."""
         position, _ = self._ik.pose(q)
         return int(np.dot(mug[:3, 0], position - mug[:3, 3]) < 0)
 
-    def _hand_for(self, mug, q, target):
-        """Pose of the tool centre point that brings the mug it holds to `target`."""
+    def _hand_for(
+        self, mug: np.ndarray, q: np.ndarray, target: np.ndarray
+    ) -> np.ndarray:
+        """Where the tool centre point brings the mug that it holds to `target`."""
         hand = _pose(*self._ik.pose(q))
         return target @ np.linalg.inv(mug) @ hand
 
 
-def _pose(position, rotation) -> np.ndarray:
+def _pose(position: ArrayLike, rotation: np.ndarray) -> np.ndarray:
     pose = np.eye(4)
     pose[:3, :3], pose[:3, 3] = rotation, position
     return pose
 
 
-def _moved(pose: np.ndarray, offset) -> np.ndarray:
+def _moved(pose: np.ndarray, offset: ArrayLike) -> np.ndarray:
     moved = pose.copy()
     moved[:3, 3] += offset
     return moved

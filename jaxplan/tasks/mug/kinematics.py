@@ -1,15 +1,13 @@
-"""Inverse kinematics that never jumps: continued from a reference pose, with a fixed null-space rule."""
+"""Inverse kinematics that never jumps: continued from a reference, with one null-space rule."""
 
 import mujoco
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-
 RETREAT = 0.10
 """How far the hand backs off along its own axis after a release [m]."""
-
-
 DAMPING = 1e-5 * np.eye(6)
+"""Of the least squares, for poses near a singularity."""
 
 
 class InverseKinematics:
@@ -25,15 +23,15 @@ class InverseKinematics:
         self._data = mujoco.MjData(model)
         self._site = model.site("tcp").id
         self._jacobian = np.zeros((6, model.nv))
-        self._lower, self._upper = model.jnt_range[:7].T + [[0.02], [-0.02]]
+        self._lower, self._upper = model.jnt_range[:7].T + np.array([[0.02], [-0.02]])
 
     def pose(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Position [m] and rotation matrix of the tool centre point."""
         self._data.qpos[:7] = q
         mujoco.mj_kinematics(self._model, self._data)
-        return self._data.site_xpos[self._site].copy(), self._data.site_xmat[
-            self._site
-        ].reshape(3, 3).copy()
+        position = self._data.site_xpos[self._site]
+        rotation = self._data.site_xmat[self._site].reshape(3, 3)
+        return position.copy(), rotation.copy()
 
     def solve(
         self,
@@ -49,7 +47,7 @@ class InverseKinematics:
             position: Target [m], shape (3,).
             rotation: Target axes as columns, shape (3, 3).
             q_reference: Where the continuation starts and what the null space prefers [rad].
-            step: Longest stride of the continuation [m and rad].
+            step: Longest stride of the continuation [0.4 m or rad].
             settle: Iterations at the target.
 
         Returns:
@@ -57,15 +55,8 @@ class InverseKinematics:
         """
         p_0, r_0 = self.pose(q_reference)
         turn = Rotation.from_matrix(rotation @ r_0.T).as_rotvec()
-        strides = (
-            int(
-                np.ceil(
-                    max(np.linalg.norm(position - p_0) / 0.4, np.linalg.norm(turn))
-                    / step
-                )
-            )
-            + 1
-        )
+        length = max(np.linalg.norm(position - p_0) / 0.4, np.linalg.norm(turn))
+        strides = int(np.ceil(length / step)) + 1
         q, error = q_reference.copy(), np.ones(6)
         for s in np.append(np.linspace(0, 1, strides + 1)[1:], np.ones(settle)):
             target = Rotation.from_rotvec(s * turn).as_matrix() @ r_0
@@ -75,17 +66,22 @@ class InverseKinematics:
                 break
             q, error = self._newton(q, position, rotation, q_reference)
         p, r = self.pose(q)
-        left = np.linalg.norm(position - p) + np.linalg.norm(
-            Rotation.from_matrix(rotation @ r.T).as_rotvec()
-        )
-        return q, float(left)
+        angle = np.linalg.norm(Rotation.from_matrix(rotation @ r.T).as_rotvec())
+        return q, float(np.linalg.norm(position - p) + angle)
 
     def retreat(self, q: np.ndarray, distance: float) -> np.ndarray:
         """Joints [rad] of a hand that has backed off by `distance` [m] along its own axis."""
         position, rotation = self.pose(q)
         return self.solve(position - distance * rotation[:, 2], rotation, q)[0]
 
-    def _newton(self, q, position, rotation, q_reference):
+    def _newton(
+        self,
+        q: np.ndarray,
+        position: np.ndarray,
+        rotation: np.ndarray,
+        q_reference: np.ndarray,
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """One damped step toward a pose; also the error (6,) before it [m, rad]."""
         p, r = self.pose(q)
         mujoco.mj_comPos(self._model, self._data)
         mujoco.mj_jacSite(

@@ -1,10 +1,11 @@
-"""The mug scene: Panda, table, mug, target box, cameras; one MJCF for physics and one for planning."""
+"""The mug scene: Panda, table, mug, target box, cameras; a model for physics, one for planning."""
 
 from importlib import resources
 from typing import Literal
 
 import mujoco
 import numpy as np
+from numpy.typing import ArrayLike
 
 from jaxplan.scene.panda_visual import add_visuals
 from jaxplan.tasks.mug.mug import STIFF_CONTACT, MugShape, add_mug
@@ -13,16 +14,26 @@ Q_HOME = np.array([0.0, -0.35, 0.0, -2.2, 0.0, 1.85, 0.785])
 """Where every episode starts: gripper down, the wrist camera over the whole range of mugs [rad]."""
 
 BOX_POSITION = np.array([0.45, -0.36, 0.0])
+"""Of the target box, on the table [m]."""
 BOX_INNER, BOX_WALL, BOX_HEIGHT, BOX_FLOOR = 0.085, 0.005, 0.04, 0.004
 """Half of the inner side, half of the wall's thickness, height and floor thickness [m]."""
 
 IMAGE_HEIGHT, IMAGE_WIDTH = 88, 136
 
+PHYSICS = {"group": 3, "contype": 1, "conaffinity": 3}
+PLANNING = {"group": 4, "contype": 4, "conaffinity": 12}
+VISUAL = {"group": 2, "contype": 0, "conaffinity": 0}
+"""Whose a geom of the surroundings is: what physics touches, planning checks, a camera sees."""
+
 
 def build(
     kind: Literal["physics", "planning"] = "physics", shape: MugShape = MugShape()
 ) -> mujoco.MjModel:
-    """Compiles the scene; `kind` says whose geoms collide (DESIGN: two sets of geoms)."""
+    """Compiles the scene; `kind` says whose geoms collide.
+
+    What physics touches (a ring of boxes, a few hulls) is in group 3, what planning checks
+    (the arm's spheres among others) in group 4, and what only the camera sees in group 2.
+    """
     return spec(kind, shape).compile()
 
 
@@ -45,8 +56,9 @@ def spec(
     _add_box(scene)
     add_mug(scene, shape)
     _add_cameras(scene)
-    scene.add_key(name="home", qpos=[*Q_HOME, 0.04, 0.04, 0.5, 0, shape.height / 2, 1, 0, 0, 0],
-                  ctrl=[*Q_HOME, 0.04, 0.04])  # fmt: skip
+    fingers = [0.04, 0.04]
+    mug = [0.5, 0, shape.height / 2, 1, 0, 0, 0]
+    scene.add_key(name="home", qpos=[*Q_HOME, *fingers, *mug], ctrl=[*Q_HOME, *fingers])
     for geom in list(scene.geoms):
         if kind == "planning" and geom.group == 3 and geom.parent.name == "mug":
             # The mug's boxes serve both: against the robot they are exact where a finger enters.
@@ -69,8 +81,15 @@ def _add_look(scene: mujoco.MjSpec) -> None:
     )
     scene.add_material(name="table", rgba=[0.76, 0.67, 0.54, 1], specular=0.1)
     scene.add_material(name="box", rgba=[0.30, 0.55, 0.34, 1], specular=0.1)
-    scene.add_texture(name="sky", type=mujoco.mjtTexture.mjTEXTURE_SKYBOX, builtin=mujoco.mjtBuiltin.mjBUILTIN_GRADIENT,
-                      rgb1=[0.92, 0.94, 0.96], rgb2=[0.62, 0.68, 0.74], width=64, height=384)  # fmt: skip
+    scene.add_texture(
+        name="sky",
+        type=mujoco.mjtTexture.mjTEXTURE_SKYBOX,
+        builtin=mujoco.mjtBuiltin.mjBUILTIN_GRADIENT,
+        rgb1=[0.92, 0.94, 0.96],
+        rgb2=[0.62, 0.68, 0.74],
+        width=64,
+        height=384,
+    )
     scene.worldbody.add_light(
         pos=[0.6, -0.8, 1.8],
         dir=[-0.2, 0.8, -1.6],
@@ -80,63 +99,57 @@ def _add_look(scene: mujoco.MjSpec) -> None:
 
 
 def _add_table(scene: mujoco.MjSpec) -> None:
-    for group in (3, 4):
-        scene.worldbody.add_geom(
-            name="table" if group == 3 else "table_planning", type=mujoco.mjtGeom.mjGEOM_PLANE,
-            size=[0, 0, 0.1], group=group, contype=1 if group == 3 else 4, conaffinity=3 if group == 3 else 12,
-            **STIFF_CONTACT,
-        )  # fmt: skip
+    plane = {"type": mujoco.mjtGeom.mjGEOM_PLANE, "size": [0, 0, 0.1], **STIFF_CONTACT}
+    scene.worldbody.add_geom(name="table", **plane, **PHYSICS)
+    scene.worldbody.add_geom(name="table_planning", **plane, **PLANNING)
     scene.worldbody.add_geom(
-        name="table_visual", type=mujoco.mjtGeom.mjGEOM_BOX, size=[0.55, 0.75, 0.02], pos=[0.35, 0, -0.0205],
-        contype=0, conaffinity=0, group=2, material="table",
-    )  # fmt: skip
+        name="table_visual",
+        type=mujoco.mjtGeom.mjGEOM_BOX,
+        size=[0.55, 0.75, 0.02],
+        pos=[0.35, 0, -0.0205],
+        material="table",
+        **VISUAL,
+    )
 
 
 def _add_box(scene: mujoco.MjSpec) -> None:
     body = scene.worldbody.add_body(name="box", pos=BOX_POSITION)
     outer, middle = BOX_INNER + 2 * BOX_WALL, BOX_INNER + BOX_WALL
-    parts = {"floor": ([0, 0, BOX_FLOOR / 2], [outer, outer, BOX_FLOOR / 2])}
     z, h = BOX_FLOOR + BOX_HEIGHT / 2, BOX_HEIGHT / 2
-    for name, x, y in (
-        ("front", 1, 0),
-        ("back", -1, 0),
-        ("left", 0, 1),
-        ("right", 0, -1),
-    ):
-        size = [BOX_WALL, outer, h] if x else [BOX_INNER, BOX_WALL, h]
-        parts[name] = ([x * middle, y * middle, z], size)
+    parts = {
+        "floor": ([0, 0, BOX_FLOOR / 2], [outer, outer, BOX_FLOOR / 2]),
+        "front": ([middle, 0, z], [BOX_WALL, outer, h]),
+        "back": ([-middle, 0, z], [BOX_WALL, outer, h]),
+        "left": ([0, middle, z], [BOX_INNER, BOX_WALL, h]),
+        "right": ([0, -middle, z], [BOX_INNER, BOX_WALL, h]),
+    }
     for name, (pos, size) in parts.items():
-        body.add_geom(
-            name=f"box_{name}", type=mujoco.mjtGeom.mjGEOM_BOX, pos=pos, size=size, group=3, contype=1,
-            conaffinity=3, material="box", **STIFF_CONTACT,
-        )  # fmt: skip
-        body.add_geom(
-            name=f"box_{name}_planning", type=mujoco.mjtGeom.mjGEOM_BOX, pos=pos, size=size, group=4, contype=4,
-            conaffinity=12,
-        )  # fmt: skip
-        body.add_geom(
-            name=f"box_{name}_visual", type=mujoco.mjtGeom.mjGEOM_BOX, pos=pos, size=size, group=2, contype=0,
-            conaffinity=0, material="box",
-        )  # fmt: skip
+        part = {"type": mujoco.mjtGeom.mjGEOM_BOX, "pos": pos, "size": size}
+        look = {"material": "box"}
+        body.add_geom(name=f"box_{name}", **part, **look, **PHYSICS, **STIFF_CONTACT)
+        body.add_geom(name=f"box_{name}_planning", **part, **PLANNING)
+        body.add_geom(name=f"box_{name}_visual", **part, **look, **VISUAL)
 
 
 def _add_cameras(scene: mujoco.MjSpec) -> None:
-    """`hand`: on the wrist, looking past the fingers; `static`: in front of the table, sees all of it."""
+    """Adds `hand`, on the wrist, looking past the fingers, and `static`, in front of the table."""
     tilt = -0.12
     scene.body("hand").add_camera(
-        name="hand", pos=[-0.065, 0, 0.0], fovy=50,
+        name="hand",
+        pos=[-0.065, 0, 0.0],
+        fovy=50,
         quat=_camera_quat(forward=[-np.sin(tilt), 0, np.cos(tilt)], up=[-1, 0, 0]),
-    )  # fmt: skip
+    )
     target, eye = np.array([0.42, -0.08, 0.1]), np.array([1.25, -0.55, 0.75])
     scene.worldbody.add_camera(
         name="static", pos=eye, fovy=45, quat=_camera_quat(target - eye, up=[0, 0, 1])
     )
 
 
-def _camera_quat(forward: np.ndarray, up: np.ndarray) -> np.ndarray:
+def _camera_quat(forward: ArrayLike, up: ArrayLike) -> np.ndarray:
     """Orientation of a MuJoCo camera (looks along -z, y up) that looks along `forward`."""
     z = -np.asarray(forward, float) / np.linalg.norm(forward)
-    x = np.cross(up, z)
+    x = np.cross(np.asarray(up, float), z)
     x /= np.linalg.norm(x)
     quat = np.zeros(4)
     mujoco.mju_mat2Quat(quat, np.stack([x, np.cross(z, x), z], 1).ravel())

@@ -3,37 +3,22 @@
 from collections.abc import Sequence
 from typing import NamedTuple
 
-import jax
+import jax.numpy as jnp
 import mujoco
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from jaxplan.collision import World
 from jaxplan.scene import Scene
 from jaxplan.simulation.camera import Camera
 from jaxplan.simulation.physics import Simulator
-from jaxplan.tasks.mug import scene
+from jaxplan.tasks.mug import judge, poses, scene
 from jaxplan.tasks.mug.kinematics import RETREAT, InverseKinematics
 from jaxplan.tasks.mug.mug import MugShape
 
-
-class MugRange(NamedTuple):
-    """Where `reset` puts the mug: uniform in each, lying, its handle on either side."""
-
-    x: tuple[float, float] = (0.400, 0.552)
-    y: tuple[float, float] = (-0.127, 0.127)
-    yaw: tuple[float, float] = (np.radians(43.5), np.radians(144.5))
-    """Direction of the opening [rad]."""
-    roll: float = np.radians(8)
-    """Largest angle by which the handle is off its resting place [rad]."""
-    pitch: float = np.radians(3)
-    drop: float = 0.006
-    """Height above the table at the start [m]."""
-
-
-RANGE = MugRange()
 SETTLE = 0.8
 """Time to come to rest after the drop [s]."""
+FINGERS, MUG = slice(7, 9), slice(9, 16)
+"""Where qpos holds the fingers [m] and the mug's position and quaternion."""
 
 
 class Observation(NamedTuple):
@@ -53,7 +38,8 @@ class MugTask:
     Args:
         batch: Number of episodes side by side.
         camera: `hand` or `static`.
-        friction: Factor on every friction coefficient (0 shows that grasps hold by friction alone).
+        friction: Factor on all friction; 0 shows that grasps hold by friction alone.
+        shape: Sizes of the mug.
     """
 
     def __init__(
@@ -70,7 +56,7 @@ class MugTask:
         self.closed = np.zeros(batch, bool)
         self._camera_name = camera
         self._camera: Camera | None = None
-        self._pads = {model.geom("left_pad").id: 0, model.geom("right_pad").id: 1}
+        self._pads = {model.geom("left_pad").id, model.geom("right_pad").id}
         self._mug_body = model.body("mug").id
         self._kinematics = InverseKinematics(model)
         self.planning_scene = Scene.from_mjcf(scene.build("planning", shape))
@@ -87,65 +73,46 @@ class MugTask:
         for episode, seed in zip(episodes, seeds, strict=True):
             data = self.sim.data[episode]
             mujoco.mj_resetDataKeyframe(self.model, data, 0)
-            position, rotation = sample_pose(seed, self.shape)
-            data.qpos[9:12] = position
-            data.qpos[12:16] = Rotation.from_matrix(rotation).as_quat()[[3, 0, 1, 2]]
+            mug = np.eye(4)
+            mug[:3, 3], mug[:3, :3] = poses.sample_pose(seed, self.shape)
+            data.qpos[MUG] = poses.from_matrix(mug)
             self.closed[episode] = False
         self.sim.wait(episodes, SETTLE)
 
     def mug(self, episode: int) -> np.ndarray:
-        """Pose of the mug in the world, (4, 4). Privileged: for the expert, the collision world and the judge."""
-        qpos = self.sim.data[episode].qpos
-        pose = np.eye(4)
-        pose[:3, 3] = qpos[9:12]
-        pose[:3, :3] = Rotation.from_quat(qpos[[13, 14, 15, 12]]).as_matrix()
-        return pose
+        """Pose of the mug in the world, (4, 4).
+
+        Privileged: for the expert, the collision world and the judge.
+        """
+        return poses.to_matrix(self.sim.data[episode].qpos[MUG])
 
     def in_range(self, episode: int) -> bool:
-        """Whether the settled mug lies inside the randomised range (a centimetre and 2 degrees of slack)."""
-        mug = self.mug(episode)
-        yaw = np.arctan2(mug[1, 2], mug[0, 2])
-        inside = [
-            low - slack <= value <= high + slack
-            for value, (low, high), slack in (
-                (mug[0, 3], RANGE.x, 0.01), (mug[1, 3], RANGE.y, 0.01), (yaw, RANGE.yaw, np.radians(2)),
-            )
-        ]  # fmt: skip
-        return all(inside) and abs(mug[2, 2]) < 0.1
+        """Whether the settled mug lies inside the randomised range, with a little slack."""
+        return poses.in_range(self.mug(episode))
 
     def observe(self, episodes: Sequence[int]) -> Observation:
         """Renders the camera and reads joints and gripper mode."""
-        if self._camera is None:
-            self._camera = Camera(self.model, scene.IMAGE_HEIGHT, scene.IMAGE_WIDTH)
-        images = [
-            self._camera.render(self.sim.data[e], self._camera_name) for e in episodes
-        ]
+        images = [self._render(self.sim.data[e]) for e in episodes]
         q = np.array([self.sim.q(e) for e in episodes], np.float32)
-        return Observation(
-            np.array(images), q, self.closed[list(episodes)].astype(np.uint8)
-        )
+        return Observation(np.array(images), q, self._gripper(episodes))
 
     def observe_at(self, episode: int, q: np.ndarray) -> Observation:
-        """What the camera would see with the arm at `q` [rad]; a held mug moves along. Physics is not touched."""
-        if self._camera is None:
-            self._camera = Camera(self.model, scene.IMAGE_HEIGHT, scene.IMAGE_WIDTH)
-        data = mujoco.MjData(self.model)
-        data.qpos[:] = self.sim.data[episode].qpos
+        """What the camera would see with the arm at `q` [rad]; a held mug moves along.
+
+        Physics is not touched.
+        """
+        present, data = self.sim.data[episode], mujoco.MjData(self.model)
+        data.qpos[:] = present.qpos
         data.qpos[:7] = q
         mujoco.mj_kinematics(self.model, data)
         if self.held(episode):
-            hand = self.hand_pose(data)
-            mug = (
-                hand
-                @ np.linalg.inv(self.hand_pose(self.sim.data[episode]))
-                @ self.mug(episode)
-            )
-            data.qpos[9:12] = mug[:3, 3]
-            data.qpos[12:16] = Rotation.from_matrix(mug[:3, :3]).as_quat()[[3, 0, 1, 2]]
+            in_hand = np.linalg.inv(self.hand_pose(present))
+            mug = self.hand_pose(data) @ in_hand @ self.mug(episode)
+            data.qpos[MUG] = poses.from_matrix(mug)
         mujoco.mj_forward(self.model, data)
-        image = self._camera.render(data, self._camera_name)
+        image = self._render(data)
         return Observation(
-            image[None], np.float32(q)[None], self.closed[[episode]].astype(np.uint8)
+            image[None], np.asarray(q, np.float32)[None], self._gripper([episode])
         )
 
     def hand_pose(self, data: mujoco.MjData) -> np.ndarray:
@@ -157,15 +124,15 @@ class MugTask:
 
     def pads_touching(self, episode: int) -> int:
         """How many of the two pads touch the mug."""
-        touching = set()
-        for contact in self.sim.data[episode].contact:
-            for pad, other in (contact.geom, contact.geom[::-1]):
-                if (
-                    pad in self._pads
-                    and self.model.geom_bodyid[other] == self._mug_body
-                ):
-                    touching.add(pad)
-        return len(touching)
+        body = self.model.geom_bodyid
+        return len(
+            {
+                pad
+                for contact in self.sim.data[episode].contact
+                for pad, other in (contact.geom, contact.geom[::-1])
+                if pad in self._pads and body[other] == self._mug_body
+            }
+        )
 
     def held(self, episode: int) -> bool:
         """Whether the closed gripper has the mug between both pads."""
@@ -196,60 +163,68 @@ class MugTask:
         return bool(np.abs(self.sim.q(episode) - q).max() < tolerance)
 
     def retreat(self, episode: int) -> np.ndarray:
-        """Joints [rad] of a hand that has backed off along its own axis; from the joints alone."""
+        """Joints [rad] of a hand that has backed off along its own axis.
+
+        From the joints alone.
+        """
         return self._kinematics.retreat(self.sim.q(episode), RETREAT)
 
     def worlds(self, touching: np.ndarray) -> World:
-        """What planning may know of each episode: the mug's place, how it is held, allowed contacts.
+        """What planning may know of each episode: the mug, how it is held, allowed contacts.
 
         Args:
             touching: (batch,) phases that end in a toggle or begin after one: there the held mug
                 may meet or leave table and box, and an open hand the mug.
         """
-        worlds = [self._world(e, bool(touching[e])) for e in range(self.batch)]
-        return jax.tree.map(lambda *leaves: np.stack(leaves), *worlds)
+        rows = [self._world(e, bool(touching[e])) for e in range(self.batch)]
+        leaves = (jnp.asarray(np.stack(leaf)) for leaf in zip(*rows, strict=True))
+        return World(*leaves)
 
-    def _world(self, episode: int, touching: bool) -> World:
+    def in_terminal_region(self, episode: int) -> bool:
+        """Q_term: the open hand is low over the target box. Known from the joints alone."""
+        tcp = self.sim.data[episode].site("tcp").xpos
+        return judge.in_terminal_region(tcp, self.closed[episode])
+
+    def failure(self, episode: int) -> str | None:
+        """Why the finished episode is no success.
+
+        None if the mug stands in the box, at rest and let go.
+        """
+        data = self.sim.data[episode]
+        return judge.failure(
+            self.mug(episode),
+            float(np.linalg.norm(data.qvel[9:12])),
+            data.site("tcp").xpos,
+            self.closed[episode],
+            self.pads_touching(episode) > 0,
+        )
+
+    def _render(self, data: mujoco.MjData) -> np.ndarray:
+        if self._camera is None:
+            self._camera = Camera(self.model, scene.IMAGE_HEIGHT, scene.IMAGE_WIDTH)
+        return self._camera.render(data, self._camera_name)
+
+    def _gripper(self, episodes: Sequence[int]) -> np.ndarray:
+        return self.closed[list(episodes)].astype(np.uint8)
+
+    def _world(self, episode: int, touching: bool) -> tuple[np.ndarray, ...]:
+        """The leaves of an episode's `World`."""
         data, mug, held = self.sim.data[episode], self.mug(episode), self.held(episode)
         if held:
             mug = np.linalg.inv(self.hand_pose(data)) @ mug
-        pose = np.concatenate(
-            [mug[:3, 3], Rotation.from_matrix(mug[:3, :3]).as_quat()[[3, 0, 1, 2]]]
-        )
-        ignored = self._allowed["held" if held else "free", touching]
-        return World(
-            np.float32(pose[None]),
+        return (
+            poses.from_matrix(mug)[None].astype(np.float32),
             np.array([held]),
-            np.float32(data.qpos[7:9].clip(0, 0.04)),
-            ignored,
+            data.qpos[FINGERS].clip(0, 0.04).astype(np.float32),
+            self._allowed["held" if held else "free", touching],
         )
-
-    def in_terminal_region(self, episode: int) -> bool:
-        """Q_term: gripper open, tool centre point low over the target box. Known from the joints alone."""
-        tcp = self.sim.data[episode].site("tcp").xpos
-        inside = np.all(
-            np.abs(tcp[:2] - scene.BOX_POSITION[:2]) < scene.BOX_INNER + 0.02
-        )
-        return bool(not self.closed[episode] and inside and tcp[2] < 0.12)
-
-    def failure(self, episode: int) -> str | None:
-        """Why the finished episode is no success; None if the mug stands in the box, at rest and let go."""
-        mug, data = self.mug(episode), self.sim.data[episode]
-        checks = {
-            "the mug is outside the box": np.any(
-                np.abs((mug[:3, 3] - scene.BOX_POSITION)[:2]) > scene.BOX_INNER
-            ),
-            "the mug is not upright": mug[2, 2] < np.cos(np.radians(20)),
-            "the mug is not at rest": np.linalg.norm(data.qvel[9:12]) > 0.01,
-            "the gripper is closed": self.closed[episode],
-            "the hand is not clear": self.pads_touching(episode) > 0
-            or np.linalg.norm(data.site("tcp").xpos - mug[:3, 3]) < 0.05,
-        }
-        return next((reason for reason, failed in checks.items() if failed), None)
 
 
 def allowed_contacts() -> dict[tuple[str, bool], list[str]]:
-    """Contacts that a phase allows, by (how the mug is, whether the phase begins or ends at a toggle)."""
+    """Contacts that a phase allows, by how the mug is and whether a toggle is near.
+
+    Near: the phase begins after a toggle or ends in one.
+    """
     pads = ["left_finger|mug", "right_finger|mug"]
     hand = [*pads, "hand|mug"]
     ground = ["mug|world", "box|mug"]
@@ -259,23 +234,3 @@ def allowed_contacts() -> dict[tuple[str, bool], list[str]]:
         ("held", False): hand,
         ("held", True): [*hand, *ground],
     }
-
-
-def sample_pose(
-    seed: int, shape: MugShape = MugShape()
-) -> tuple[np.ndarray, np.ndarray]:
-    """Position [m] and rotation matrix from which the mug of a seed is dropped."""
-    rng = np.random.default_rng(seed)
-    x, y, yaw = rng.uniform(*np.array([RANGE.x, RANGE.y, RANGE.yaw]).T)
-    right = bool(rng.integers(2))
-    pitch, off = rng.uniform(-RANGE.pitch, RANGE.pitch), rng.uniform(0, RANGE.roll)
-    # At rest the handle's tip touches the table: this far below the horizontal, on either side.
-    rest = np.arcsin(shape.radius / shape.handle_reach)
-    angle = np.pi + rest - off if right else -rest + off
-    axis = np.array(
-        [np.cos(yaw) * np.cos(pitch), np.sin(yaw) * np.cos(pitch), np.sin(pitch)]
-    )
-    side = np.array([-np.sin(yaw), np.cos(yaw), 0.0])
-    handle = np.cos(angle) * side + np.sin(angle) * np.cross(axis, side)
-    rotation = np.stack([handle, np.cross(axis, handle), axis], 1)
-    return np.array([x, y, shape.radius + RANGE.drop]), rotation

@@ -1,0 +1,73 @@
+"""Poses of the mug: as physics keeps them, and where an episode begins."""
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from jaxplan.tasks.mug.mug import MugShape
+
+
+class MugRange(NamedTuple):
+    """Where `reset` puts the mug: uniform in each, lying, its handle on either side."""
+
+    x: tuple[float, float] = (0.400, 0.552)
+    y: tuple[float, float] = (-0.127, 0.127)
+    yaw: tuple[float, float] = (np.radians(43.5), np.radians(144.5))
+    """Direction of the opening [rad]."""
+    roll: float = np.radians(8)
+    """Largest angle by which the handle is off its resting place [rad]."""
+    pitch: float = np.radians(3)
+    drop: float = 0.006
+    """Height above the table at the start [m]."""
+
+
+RANGE = MugRange()
+
+
+def sample_pose(
+    seed: int, shape: MugShape = MugShape()
+) -> tuple[np.ndarray, np.ndarray]:
+    """Position [m] and rotation matrix from which the mug of a seed is dropped."""
+    rng = np.random.default_rng(seed)
+    x, y, yaw = rng.uniform(*np.array([RANGE.x, RANGE.y, RANGE.yaw]).T)
+    right = bool(rng.integers(2))
+    pitch, off = rng.uniform(-RANGE.pitch, RANGE.pitch), rng.uniform(0, RANGE.roll)
+    # At rest the handle's tip touches the table: this far below the horizontal, on either side.
+    rest = np.arcsin(shape.radius / shape.handle_reach)
+    angle = np.pi + rest - off if right else -rest + off
+    axis = np.array(
+        [np.cos(yaw) * np.cos(pitch), np.sin(yaw) * np.cos(pitch), np.sin(pitch)]
+    )
+    side = np.array([-np.sin(yaw), np.cos(yaw), 0.0])
+    handle = np.cos(angle) * side + np.sin(angle) * np.cross(axis, side)
+    rotation = np.stack([handle, np.cross(axis, handle), axis], 1)
+    return np.array([x, y, shape.radius + RANGE.drop]), rotation
+
+
+def in_range(mug: np.ndarray) -> bool:
+    """Whether a pose (4, 4) lies in `RANGE`, with a centimetre and two degrees of slack."""
+    yaw = np.arctan2(mug[1, 2], mug[0, 2])
+    inside = [
+        low - slack <= value <= high + slack
+        for value, (low, high), slack in (
+            (mug[0, 3], RANGE.x, 0.01),
+            (mug[1, 3], RANGE.y, 0.01),
+            (yaw, RANGE.yaw, np.radians(2)),
+        )
+    ]
+    return bool(all(inside) and abs(mug[2, 2]) < 0.1)
+
+
+def to_matrix(pose: np.ndarray) -> np.ndarray:
+    """(4, 4) of a position and a quaternion (w, x, y, z), shape (7,)."""
+    matrix = np.eye(4)
+    matrix[:3, 3] = pose[:3]
+    matrix[:3, :3] = Rotation.from_quat(pose[3:], scalar_first=True).as_matrix()
+    return matrix
+
+
+def from_matrix(matrix: np.ndarray) -> np.ndarray:
+    """Position and quaternion (w, x, y, z), shape (7,), of a (4, 4)."""
+    quat = Rotation.from_matrix(matrix[:3, :3]).as_quat(scalar_first=True)
+    return np.concatenate([matrix[:3, 3], quat])
