@@ -26,28 +26,30 @@ class Args:
 
 
 def main(args: Args) -> None:
-    """Evaluates, prints the rate and the reasons of failure, writes JSON."""
+    """Evaluates, writes JSON, prints the rate, the reasons of failure and toggle errors."""
     seeds = parse_seeds(args.seeds)
     weights = load_pair(args.weights)
+    args.out.parent.mkdir(parents=True, exist_ok=True)
     with tqdm(total=len(seeds), unit="episode") as bar:
         result = evaluate(seeds, weights, args.study, bar.update)
-    args.out.parent.mkdir(parents=True, exist_ok=True)
     args.out.write_text(json.dumps(result, indent=1) + "\n")
     low, high = result["wilson_95"]
     print(
-        f"success {result['successes']}/{result['trials']} = {result['success_rate']:.3f} (95 %: {low:.3f} to {high:.3f})"
+        f"success {result['successes']}/{result['trials']} = {result['success_rate']:.3f} "
+        f"(95 %: {low:.3f} to {high:.3f})"
     )
     for episode in result["episodes"]:
         if not episode["success"]:
             print(f"  seed {episode['seed']}: {episode['failure']}")
-    for toggle, row in result["toggle_error"].get("per_toggle", {}).items():
+    if error := result["toggle_error"]:
+        for toggle, row in error["per_toggle"].items():
+            print(
+                f"  toggle error, {toggle}: mean {row['mean']:.4f}, "
+                f"median {row['median']:.4f} rad over {row['phases']} phases"
+            )
         print(
-            f"  toggle error, {toggle}: mean {row['mean']:.4f}, median {row['median']:.4f} rad over {row['phases']} phases"
-        )
-    if result["toggle_error"]:
-        error = result["toggle_error"]
-        print(
-            f"  toggle error, all: mean {error['mean']:.4f}; to the nearest toggle (paper): {error['nearest_toggle_mean']:.4f} rad"
+            f"  toggle error, all: mean {error['mean']:.4f}; "
+            f"to the nearest toggle (paper): {error['nearest_toggle_mean']:.4f} rad"
         )
     print(f"{result['seconds']:.0f} s; written to {args.out}")
 
@@ -55,6 +57,6 @@ def main(args: Args) -> None:
 if __name__ == "__main__":
     try:
         main(tyro.cli(Args))
-    except (ValueError, RuntimeError) as error:
+    except (ValueError, RuntimeError, OSError) as error:
         print(f"error: {error}", file=sys.stderr)
         sys.exit(2)

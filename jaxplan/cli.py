@@ -6,11 +6,8 @@ import io
 import sys
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
 
 import tyro
-
-COMMANDS = ("solve",)
 
 
 @dataclass(frozen=True)
@@ -25,29 +22,29 @@ class Solve:
     """Directory with predictor, sampler and manifest; the package's own by default."""
 
 
+COMMANDS = {"solve": Solve}
+
+
 def main(arguments: list[str] | None = None) -> int:
     """Runs a command; 0 when done, 1 if the episode failed, 2 for bad input."""
     arguments = sys.argv[1:] if arguments is None else arguments
     if arguments and not arguments[0].startswith("-") and arguments[0] not in COMMANDS:
         near = difflib.get_close_matches(arguments[0], COMMANDS, 1)
-        hint = (
-            f"; did you mean {near[0]}?"
-            if near
-            else f" (there is: {', '.join(COMMANDS)})"
-        )
+        known = f" (there is: {', '.join(COMMANDS)})"
+        hint = f"; did you mean {near[0]}?" if near else known
         return _fail(f"unknown command {arguments[0]!r}{hint}")
     command = tyro.extras.subcommand_cli_from_dict(
-        {"solve": Solve}, prog="jaxplan", args=arguments
+        COMMANDS, prog="jaxplan", args=arguments
     )
     try:
         return _solve(command)
-    except (ValueError, RuntimeError) as error:
-        return _fail(str(error).splitlines()[0])
+    except (ValueError, RuntimeError, OSError) as error:
+        return _fail((str(error) or type(error).__name__).splitlines()[0])
 
 
 def _solve(command: Solve) -> int:
-    if command.seed < 0:
-        raise ValueError(f"seed {command.seed}: expected 0 or more")
+    if not 0 <= command.seed < 2**31:
+        raise ValueError(f"seed {command.seed}: expected 0 to {2**31 - 1}")
     with contextlib.redirect_stdout(io.StringIO()):  # `import mujoco.mjx` prints
         from jaxplan.learning import load_pair
         from jaxplan.learning.pretrained import DIRECTORY

@@ -20,7 +20,9 @@ LAYERS = (
     {"rollout"},
     {"agent"},
     {"evaluation"},
-    {"solve", "train", "cli", "__init__", "__main__"},
+    {"solve", "train", "__init__"},
+    {"cli"},
+    {"__main__"},
 )
 LAYER = {part: i for i, parts in enumerate(LAYERS) for part in parts}
 

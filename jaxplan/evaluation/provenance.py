@@ -13,10 +13,11 @@ PACKAGES = ("jax", "jaxlib", "flax", "mujoco", "mujoco-mjx", "numpy")
 
 def versions() -> dict[str, str]:
     """Versions of what computes, the platform and the device."""
-    found = {
+    device = jax.devices()[0]
+    machine = f"{platform.machine()}, {os.cpu_count()} cores"
+    return {
         "jaxplan": __version__,
         **{package: version(package) for package in PACKAGES},
+        "python": platform.python_version(),
+        "machine": f"{machine}, {device.platform}: {device.device_kind}",
     }
-    device = jax.devices()[0]
-    machine = f"{platform.machine()}, {os.cpu_count()} cores, {device.platform}: {device.device_kind}"
-    return {**found, "python": platform.python_version(), "machine": machine}

@@ -5,17 +5,17 @@ def parse_seeds(text: str) -> range:
     """`A:B` is the half-open range of seeds; `A` alone is one seed.
 
     Raises:
-        ValueError: Not of that form, negative, or empty.
+        ValueError: Not of that form, negative, too large, or empty.
     """
+    first, colon, end = text.partition(":")
     try:
-        first, _, end = text.partition(":")
-        seeds = range(int(first), int(end) if end else int(first) + 1)
+        seeds = range(int(first), int(end) if colon else int(first) + 1)
     except ValueError:
         raise ValueError(
             f"seeds {text!r}: expected FIRST:END, for example 100000:100100"
         ) from None
-    if len(seeds) == 0 or seeds.start < 0:
+    if not 0 <= seeds.start < seeds.stop <= 2**31:
         raise ValueError(
-            f"seeds {text!r}: the range is empty or negative; expected FIRST:END with FIRST < END"
+            f"seeds {text!r}: expected FIRST:END with 0 <= FIRST < END <= {2**31}"
         )
     return seeds

@@ -37,7 +37,7 @@ def evaluate(
     seeds: Sequence[int],
     weights: tuple[Weights, Weights],
     config: Success = Success(),
-    progress: Callable[[int], None] = lambda done: None,
+    progress: Callable[[int], object] = lambda done: None,
     change_predict: Callable[[Agent, MugTask], Predict] | None = None,
     listen: Callable[[MugTask, Phase], None] | None = None,
 ) -> dict[str, Any]:
@@ -90,8 +90,8 @@ def evaluate(
         "seconds": time.perf_counter() - start,
         "episodes": [episode_json(record) for record in records],
         "weights": {
-            w: info.info.get("sha256")
-            for w, info in zip(("predictor", "sampler"), weights, strict=True)
+            name: network.info.get("sha256")
+            for name, network in zip(("predictor", "sampler"), weights, strict=True)
         },
         "config": dataclasses.asdict(config),
         "versions": versions(),

@@ -1,6 +1,7 @@
 """How far predicted toggles are from the expert's, at the phase starts that execution met."""
 
-from typing import NamedTuple
+from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -10,81 +11,83 @@ from jaxplan.tasks.mug.expert import Expert
 from jaxplan.tasks.mug.task import MugTask
 
 
+class ToggleError(NamedTuple):
+    """One prediction's L2 errors over the joints [rad]."""
+
+    toggle: int
+    """Index into `TOGGLES` of the toggle that came next."""
+    error: float
+    """To the expert's."""
+    nearest: float
+    """To the nearest toggle of the whole episode: the paper's measure."""
+
+
+class _Prediction(NamedTuple):
+    episode: int
+    toggle: int
+    predicted: np.ndarray
+    expert: np.ndarray
+
+
 class ToggleErrors:
     """Listens to the outer loop and compares each prediction with the expert's toggle.
 
     The expert sees the mug; it is asked after the prediction was made and answers nobody else.
     """
 
-    class Row(NamedTuple):
-        """One prediction."""
-
-        episode: int
-        toggle: int
-        predicted: np.ndarray
-        expert: np.ndarray
-
     def __init__(self, task: MugTask) -> None:
         self._task, self._expert = task, Expert(task.model, task.shape)
-        self._rows: list[ToggleErrors.Row] = []
-        self._done: list[dict] = []
+        self._predictions: list[_Prediction] = []
+        self._errors: list[ToggleError] = []
 
     def __call__(self, phase: Phase) -> None:
-        """Keeps the errors of a round."""
+        """Keeps a round's predictions."""
         for row, e in enumerate(phase.episodes):
             if self._task.in_terminal_region(e):
                 continue
             q = phase.observation.q[row].astype(float)
-            keyframes = self._expert.keyframes(
-                self._task.mug(e), q, bool(self._task.closed[e])
-            )
-            self._rows.append(
-                self.Row(
-                    e,
-                    int(keyframes.toggle),
-                    phase.targets.q_toggle[row],
-                    keyframes.q[-1],
-                )
+            closed = bool(self._task.closed[e])
+            keyframes = self._expert.keyframes(self._task.mug(e), q, closed)
+            predicted = phase.targets.q_toggle[row]
+            self._predictions.append(
+                _Prediction(e, int(keyframes.toggle), predicted, keyframes.q[-1])
             )
 
     def finish(self) -> None:
         """Ends a batch: its episodes' toggles are now all known."""
         truth: dict[int, list[np.ndarray]] = {}
-        for row in self._rows:
-            truth.setdefault(row.episode, []).append(row.expert)
-        for row in self._rows:
-            nearest = np.linalg.norm(
-                np.array(truth[row.episode]) - row.predicted, axis=1
-            ).min()
-            error = np.linalg.norm(row.predicted - row.expert)
-            self._done.append(
-                {
-                    "toggle": TOGGLES[row.toggle],
-                    "error": float(error),
-                    "nearest": float(nearest),
-                }
+        for p in self._predictions:
+            truth.setdefault(p.episode, []).append(p.expert)
+        for p in self._predictions:
+            error = np.linalg.norm(p.predicted - p.expert)
+            distances = np.linalg.norm(np.array(truth[p.episode]) - p.predicted, axis=1)
+            self._errors.append(
+                ToggleError(p.toggle, float(error), float(distances.min()))
             )
-        self._rows = []
+        self._predictions = []
 
-    def summary(self) -> dict:
-        """L2 errors over the joints [rad]: mean and median per toggle, and the paper's nearest-toggle mean."""
-        if not self._done:
-            return {}
-        table = {}
-        for toggle in TOGGLES:
-            errors = [row["error"] for row in self._done if row["toggle"] == toggle]
-            if errors:
-                table[toggle] = {
-                    "mean": float(np.mean(errors)),
-                    "median": float(np.median(errors)),
-                    "phases": len(errors),
-                }
-        errors = [row["error"] for row in self._done]
-        return {
-            "per_toggle": table,
-            "mean": float(np.mean(errors)),
-            "median": float(np.median(errors)),
-            "nearest_toggle_mean": float(
-                np.mean([row["nearest"] for row in self._done])
-            ),
-        }
+    def summary(self) -> dict[str, Any]:
+        """Of all finished batches; see `summarize`."""
+        return summarize(self._errors)
+
+
+def summarize(errors: Sequence[ToggleError]) -> dict[str, Any]:
+    """Mean and median of each toggle and of all, and the nearest-toggle mean [rad].
+
+    Empty if there are no errors.
+    """
+    if not errors:
+        return {}
+    per_toggle = {}
+    for index, name in enumerate(TOGGLES):
+        if own := [row.error for row in errors if row.toggle == index]:
+            per_toggle[name] = {**_statistics(own), "phases": len(own)}
+    return {
+        "per_toggle": per_toggle,
+        **_statistics([row.error for row in errors]),
+        "nearest_toggle_mean": float(np.mean([row.nearest for row in errors])),
+    }
+
+
+def _statistics(values: Sequence[float]) -> dict[str, float]:
+    return {"mean": float(np.mean(values)), "median": float(np.median(values))}
