@@ -1,21 +1,28 @@
-"""From one configuration to another in a scene: search, smooth, time. Compiled once per batch size."""
+"""From one configuration to another in a scene: search, smooth, time, for a batch of problems."""
 
 import time
+from collections.abc import Callable
 from functools import partial
 from typing import NamedTuple
 
 import jax
 import numpy as np
+from numpy.typing import ArrayLike
 
 from jaxplan import collision
 from jaxplan.collision import World
 from jaxplan.config import PlannerConfig, TrajectoryConfig
-from jaxplan.planning import PlanResult, make_planner
+from jaxplan.planning import PlanResult, Segment, make_planner
 from jaxplan.scene import Scene
 from jaxplan.scene.panda import JointLimits
 from jaxplan.trajectory import Rung, make_trajectory
 
 jit = partial(jax.jit, compiler_options=collision.XLA_OPTIONS)
+
+NEAR = 0.15
+"""How far from a start or goal in collision a free configuration is looked for [rad]."""
+NEIGHBOURS = 128
+"""How many are tried."""
 
 
 class Motion(NamedTuple):
@@ -23,19 +30,17 @@ class Motion(NamedTuple):
 
     result: PlanResult
     q: list[np.ndarray]
-    """Commands sampled at the control period, (T_p, d) each [rad]; empty where none may be executed."""
+    """Commands sampled at the control period, (T_p, d) each [rad]; empty: do not execute."""
     rung: np.ndarray
     """[P] the `Rung` of each trajectory."""
     seconds: float
     """Wall time of the search of the whole batch [s], smoothing left out."""
 
 
-NEAR = 0.15
-"""How far from a start or goal in collision a free configuration is looked for [rad]."""
-
-
 class MotionPlanner:
     """Plans batches of motions in one scene, whose worlds differ from problem to problem.
+
+    Everything compiles once for a batch size.
 
     Args:
         scene: What collides.
@@ -52,118 +57,123 @@ class MotionPlanner:
         trajectory: TrajectoryConfig = TrajectoryConfig(),
     ) -> None:
         self.scene, self.limits = scene, limits
-        self._trajectory_config = trajectory
-
-        def config_free(worlds, problem, q):
-            return collision.config_free(
-                scene, _rows(worlds, problem), q, planner.margin
-            )
-
+        self._trajectory = trajectory
         points = collision.points_for(planner.step_max, planner.edge_resolution)
 
-        def motion_free(worlds, problem, q0, q1):
-            return collision.motion_free(
-                scene, _rows(worlds, problem), q0, q1, points, planner.margin
-            )
+        def config_free(worlds, problem, q):
+            world = _rows(worlds, problem)
+            return collision.config_free(scene, world, q, planner.margin)
 
-        offsets = np.random.default_rng(0).normal(size=(128, len(limits.q_min)))
-        radii = np.linspace(0, NEAR, 129)[1:, None]
-        self._offsets = offsets / np.linalg.norm(offsets, axis=1, keepdims=True) * radii
+        def motion_free(worlds, problem, q0, q1):
+            world = _rows(worlds, problem)
+            return collision.motion_free(scene, world, q0, q1, points, planner.margin)
+
         self._config_free = jit(config_free)
         self._search = make_planner(
             motion_free, config_free, planner, limits.q_min, limits.q_max, jit
         )
+        self._offsets = _neighbours(len(limits.q_min))
 
     def plan(
         self,
         worlds: World,
-        q_start,
-        q_goal,
-        q_toggle,
-        keys,
-        draw=None,
-        active=None,
-        speed=None,
+        q_start: ArrayLike,
+        q_goal: ArrayLike,
+        q_toggle: ArrayLike,
+        keys: jax.Array,
+        draw: Callable[[jax.Array], Segment] | None = None,
+        active: ArrayLike | None = None,
+        speed: ArrayLike | None = None,
     ) -> Motion:
         """Searches, smooths and times P motions; see `make_planner` and `make_trajectory`.
 
-        A start or goal in collision is replaced by the nearest free configuration within `NEAR`,
-        as a goal that was predicted from a picture may lie a hair inside an obstacle; a motion
-        from such a start begins with the straight way out. `speed` [P] is a factor on
-        each problem's velocity limits, and its square on the accelerations (1 if None).
+        A start or goal in collision is replaced by the nearest free configuration within
+        `NEAR`, as a goal that was predicted from a picture may lie a hair inside an obstacle; a
+        motion from such a start begins with the straight way out.
+
+        Args:
+            worlds: Leaves [P, ...].
+            q_start: [P, d] [rad].
+            q_goal: [P, d] [rad].
+            q_toggle: [P, d] [rad].
+            keys: [P] typed keys.
+            draw: Learned segments; without it all proposals are uniform.
+            active: [P], false for padding lanes.
+            speed: [P] factors on the velocity limits, their squares on the accelerations.
         """
-        start = time.perf_counter()
-        q_start, q_goal = (
-            np.asarray(q_start, np.float32),
-            np.asarray(q_goal, np.float32),
-        )
-        first, last = (
-            self._nearest_free(worlds, q_start),
-            self._nearest_free(worlds, q_goal),
-        )
+        q_start = np.asarray(q_start, np.float32)
+        q_goal = np.asarray(q_goal, np.float32)
+        began = time.perf_counter()
+        first = self._nearest_free(worlds, q_start)
+        last = self._nearest_free(worlds, q_goal)
         result = jax.block_until_ready(
             self._search(worlds, first, last, q_toggle, keys, draw, active)
         )
-        seconds = time.perf_counter() - start
+        seconds = time.perf_counter() - began
         result = jax.tree.map(np.asarray, result)
-        speed = (
-            np.ones((len(result.path), 1))
-            if speed is None
-            else np.reshape(speed, (-1, 1))
-        )
-        velocity, acceleration = (
-            speed * self.limits.velocity,
-            speed**2 * self.limits.acceleration,
-        )
+        factor = np.reshape(np.ones(len(first)) if speed is None else speed, (-1, 1))
+        velocity = factor * self.limits.velocity
+        acceleration = factor**2 * self.limits.acceleration
         timed = make_trajectory(
-            result.path, result.path_length, keys, partial(self._config_free, worlds),
-            velocity, acceleration, self._trajectory_config,
-        )  # fmt: skip
+            result.path,
+            result.path_length,
+            keys,
+            partial(self._config_free, worlds),
+            velocity,
+            acceleration,
+            self._trajectory,
+        )
+        period = self._trajectory.control_period
         commands = []
         for p, length in enumerate(timed.length):
             if result.path_length[p] < 1 or timed.rung[p] == Rung.INVALID:
                 commands.append(timed.q[p, :0])
                 continue
             escape = _straight(
-                q_start[p],
-                first[p],
-                velocity[p],
-                acceleration[p],
-                self._trajectory_config.control_period,
+                q_start[p], first[p], velocity[p], acceleration[p], period
             )
             commands.append(np.concatenate([escape, timed.q[p, :length]]))
         return Motion(result, commands, timed.rung, seconds)
 
-    def reason(self, worlds: World, lane: int, q) -> str:
-        """What is in the way at `q` [rad] in a lane's world, for a message."""
+    def reason(self, worlds: World, lane: int, q: np.ndarray) -> str:
+        """What is nearest at `q` [rad] in a lane's world, for a message."""
         world = jax.tree.map(lambda leaf: leaf[lane], worlds)
         pair, distance = collision.closest_pair(self.scene, world, q)
-        return (
-            "nothing"
-            if pair is None
-            else f"{pair[0]} and {pair[1]}, {1000 * distance:.1f} mm apart"
-        )
+        if pair is None:
+            return "nothing"
+        return f"{pair[0]} and {pair[1]}, {1000 * distance:.1f} mm apart"
 
     def _nearest_free(self, worlds: World, q: np.ndarray) -> np.ndarray:
-        """`q` [P, d] itself where it is free, else the nearest free one of fixed offsets, else `q`."""
-        free = np.asarray(self._config_free(worlds, np.arange(len(q)), q))
+        """`q` [P, d] where it is free or nothing near is, else the nearest free neighbour."""
+        problem = np.arange(len(q))
+        free = np.asarray(self._config_free(worlds, problem, q))
         if free.all():
             return q
         near = np.clip(
             q[:, None] + self._offsets, self.limits.q_min, self.limits.q_max
         ).astype(np.float32)
-        rows = np.repeat(np.arange(len(q)), near.shape[1])
-        found = np.asarray(
-            self._config_free(worlds, rows, near.reshape(-1, q.shape[1]))
-        ).reshape(near.shape[:2])
-        best = near[np.arange(len(q)), found.argmax(1)]
+        rows = near.reshape(-1, q.shape[1])
+        found = self._config_free(worlds, np.repeat(problem, NEIGHBOURS), rows)
+        found = np.asarray(found).reshape(-1, NEIGHBOURS)
+        best = near[problem, found.argmax(1)]
         return np.where((~free & found.any(1))[:, None], best, q)
 
 
+def _neighbours(joints: int) -> np.ndarray:
+    """Offsets `[NEIGHBOURS, joints]` in fixed random directions, growing up to `NEAR` [rad]."""
+    offsets = np.random.default_rng(0).normal(size=(NEIGHBOURS, joints))
+    offsets /= np.linalg.norm(offsets, axis=1, keepdims=True)
+    return offsets * np.linspace(0, NEAR, NEIGHBOURS + 1)[1:, None]
+
+
 def _straight(
-    q0: np.ndarray, q1: np.ndarray, velocity, acceleration, period: float
+    q0: np.ndarray,
+    q1: np.ndarray,
+    velocity: np.ndarray,
+    acceleration: np.ndarray,
+    period: float,
 ) -> np.ndarray:
-    """Samples of a straight rest-to-rest motion, its end left out: (T, d), empty if there is nothing to do."""
+    """Samples of a straight rest-to-rest motion but its end: (T, d), empty if q0 is q1."""
     distance = np.abs(q1 - q0)
     # Peaks of the quintic time law: 15/8 of the mean velocity, 10/sqrt(3) d / T^2.
     duration = max(
