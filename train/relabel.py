@@ -1,0 +1,77 @@
+"""Relabelled closed-loop states: `python train/relabel.py --out data/mug_relabelled`.
+
+The networks drive; at each phase's start the expert says what it would have done (one round of
+DAgger). Resumes shard by shard, as `collect_demos.py` does.
+"""
+
+import dataclasses
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import tyro
+from tqdm import tqdm
+
+from jaxplan import data
+from jaxplan.agent import Agent
+from jaxplan.learning import load_pair
+from jaxplan.learning.pretrained import DIRECTORY
+from jaxplan.motion import MotionPlanner
+from jaxplan.rollout import rollout
+from jaxplan.scene.panda import PANDA_LIMITS
+from jaxplan.tasks.mug.relabel import Relabeler
+from jaxplan.tasks.mug.task import MugTask
+
+
+@dataclass(frozen=True)
+class Args:
+    """What to collect."""
+
+    out: Path = Path("data/mug_relabelled")
+    weights: Path = DIRECTORY
+    episodes: int = 256
+    first_seed: int = 50_000
+    shard_size: int = 32
+    camera: str = "hand"
+
+
+def main(args: Args) -> None:
+    """Collects what is missing."""
+    if args.episodes < 1 or args.shard_size < 1:
+        raise ValueError(
+            f"nothing to do: {args.episodes} episodes, {args.shard_size} a shard"
+        )
+    weights = load_pair(args.weights)
+    settings = dataclasses.asdict(args) | {
+        "out": None,
+        "episodes": None,
+        "weights": [entry.info["sha256"] for entry in weights],
+    }
+    args.out.mkdir(parents=True, exist_ok=True)
+    count = -(-args.episodes // args.shard_size)
+    missing = data.missing_shards(args.out, count, settings)
+    data.write_manifest(args.out, settings)
+    task = MugTask(args.shard_size, args.camera)
+    planner = MotionPlanner(task.planning_scene, PANDA_LIMITS)
+    agent = Agent(*weights, args.shard_size)
+    bar = tqdm(missing, unit="shard")
+    for index in bar:
+        first = args.first_seed + index * args.shard_size
+        seeds = range(first, first + args.shard_size)
+        relabeler = Relabeler(task, seeds)
+        records = rollout(
+            task, seeds, agent.predict, planner, agent.propose, listen=relabeler
+        )
+        data.write_shard(data.shard_path(args.out, index), relabeler.shard(records))
+        bar.set_postfix_str(
+            f"{sum(r.success for r in records)}/{len(records)} succeeded"
+        )
+    data.write_manifest(args.out, settings)
+
+
+if __name__ == "__main__":
+    try:
+        main(tyro.cli(Args))
+    except (ValueError, RuntimeError) as error:
+        print(f"error: {error}", file=sys.stderr)
+        sys.exit(2)
