@@ -3,5 +3,6 @@
 from jaxplan.evaluation.provenance import versions as versions
 from jaxplan.evaluation.seeds import parse_seeds as parse_seeds
 from jaxplan.evaluation.statistics import wilson as wilson
+from jaxplan.evaluation.success import Study as Study
 from jaxplan.evaluation.success import Success as Success
 from jaxplan.evaluation.success import evaluate as evaluate

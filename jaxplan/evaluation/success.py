@@ -33,69 +33,103 @@ class Success:
     """Factor on all friction; 0 shows that grasps hold by friction alone."""
 
 
+class Study:
+    """Everything that runs episodes, compiled once and used for any number of them.
+
+    Args:
+        weights: Predictor and sampler.
+        config: Settings.
+    """
+
+    def __init__(
+        self, weights: tuple[Weights, Weights], config: Success = Success()
+    ) -> None:
+        self.config, self._weights = config, weights
+        self.task = MugTask(config.batch, config.camera, config.friction)
+        self.planner = MotionPlanner(
+            self.task.planning_scene, PANDA_LIMITS, config.planner, config.trajectory
+        )
+        self.agent = Agent(*weights, config.batch, config.inference_steps)
+
+    def run(
+        self,
+        seeds: Sequence[int],
+        progress: Callable[[int], object] = lambda done: None,
+        predict: Predict | None = None,
+        listen: Callable[[Phase], None] | None = None,
+    ) -> dict[str, Any]:
+        """Runs one episode per seed.
+
+        Args:
+            seeds: Episodes.
+            progress: Called with the number of episodes of each finished batch.
+            predict: Takes the place of the agent's `predict` (ablations).
+            listen: Called once a round, beside the toggle errors.
+
+        Returns:
+            JSON-ready: success_rate, wilson_95, episodes, toggle_error, config, versions.
+        """
+        errors = ToggleErrors(self.task)
+
+        def heard(phase: Phase) -> None:
+            errors(phase)
+            if listen is not None:
+                listen(phase)
+
+        start = time.perf_counter()
+        records: list[EpisodeRecord] = []
+        for first in range(0, len(seeds), self.config.batch):
+            part = seeds[first : first + self.config.batch]
+            records += rollout(
+                self.task,
+                part,
+                predict or self.agent.predict,
+                self.planner,
+                self.agent.propose,
+                self.config.rollout,
+                heard,
+            )
+            errors.finish()
+            progress(len(part))
+        seconds = time.perf_counter() - start
+        return self._result(records) | {
+            "toggle_error": errors.summary(),
+            "seconds": seconds,
+        }
+
+    def _result(self, records: list[EpisodeRecord]) -> dict[str, Any]:
+        successes = sum(record.success for record in records)
+        phases = [phase for record in records for phase in record.phases]
+        return {
+            "success_rate": successes / len(records),
+            "wilson_95": list(wilson(successes, len(records))),
+            "successes": successes,
+            "trials": len(records),
+            "expansions_per_success": _mean(
+                [record.expansions for record in records if record.success]
+            ),
+            "phases_solved": _mean([phase.status == "SOLVED" for phase in phases]),
+            "episodes": [episode_json(record) for record in records],
+            "weights": {
+                name: network.info.get("sha256")
+                for name, network in zip(
+                    ("predictor", "sampler"), self._weights, strict=True
+                )
+            },
+            "config": dataclasses.asdict(self.config),
+            "versions": versions(),
+        }
+
+
 def evaluate(
     seeds: Sequence[int],
     weights: tuple[Weights, Weights],
     config: Success = Success(),
     progress: Callable[[int], object] = lambda done: None,
-    change_predict: Callable[[Agent, MugTask], Predict] | None = None,
-    listen: Callable[[MugTask, Phase], None] | None = None,
 ) -> dict[str, Any]:
-    """Runs one episode per seed.
-
-    Args:
-        seeds: Episodes.
-        weights: Predictor and sampler.
-        config: Settings.
-        progress: Called with the number of episodes of each finished batch.
-        change_predict: Puts something else in the place of the agent's `predict` (ablations).
-        listen: Called once a round, beside the toggle errors.
-
-    Returns:
-        A JSON-ready dict: success_rate, wilson_95, episodes, toggle_error, config, versions.
-    """
+    """Runs one episode per seed; see `Study.run`."""
     batch = min(config.batch, len(seeds))
-    task = MugTask(batch, config.camera, config.friction)
-    planner = MotionPlanner(
-        task.planning_scene, PANDA_LIMITS, config.planner, config.trajectory
-    )
-    agent = Agent(*weights, batch, config.inference_steps)
-    predict = agent.predict if change_predict is None else change_predict(agent, task)
-    errors = ToggleErrors(task)
-
-    def heard(phase: Phase) -> None:
-        errors(phase)
-        if listen is not None:
-            listen(task, phase)
-
-    start = time.perf_counter()
-    records: list[EpisodeRecord] = []
-    for first in range(0, len(seeds), batch):
-        part = seeds[first : first + batch]
-        records += rollout(
-            task, part, predict, planner, agent.propose, config.rollout, heard
-        )
-        errors.finish()
-        progress(len(part))
-    successes = sum(record.success for record in records)
-    phases = [phase for record in records for phase in record.phases]
-    return {
-        "success_rate": successes / len(records),
-        "wilson_95": list(wilson(successes, len(records))),
-        "successes": successes,
-        "trials": len(records),
-        "expansions_per_success": _mean([r.expansions for r in records if r.success]),
-        "phases_solved": _mean([phase.status == "SOLVED" for phase in phases]),
-        "toggle_error": errors.summary(),
-        "seconds": time.perf_counter() - start,
-        "episodes": [episode_json(record) for record in records],
-        "weights": {
-            name: network.info.get("sha256")
-            for name, network in zip(("predictor", "sampler"), weights, strict=True)
-        },
-        "config": dataclasses.asdict(config),
-        "versions": versions(),
-    }
+    return Study(weights, dataclasses.replace(config, batch=batch)).run(seeds, progress)
 
 
 def episode_json(record: EpisodeRecord) -> dict[str, Any]:

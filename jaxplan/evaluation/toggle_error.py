@@ -43,7 +43,8 @@ class ToggleErrors:
     def __call__(self, phase: Phase) -> None:
         """Keeps a round's predictions."""
         for row, e in enumerate(phase.episodes):
-            if self._task.in_terminal_region(e):
+            dropped = self._task.closed[e] and not self._task.held(e)
+            if self._task.in_terminal_region(e) or dropped:
                 continue
             q = phase.observation.q[row].astype(float)
             closed = bool(self._task.closed[e])

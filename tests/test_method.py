@@ -1,0 +1,97 @@
+"""The shipped weights: that they work, by the picture alone, and by friction alone."""
+
+import jax
+import numpy as np
+import pytest
+
+from jaxplan.evaluation import Study, Success
+from jaxplan.learning import load_pair
+
+SEEDS = range(100_100, 100_116)
+"""Beside the seeds of the published success rate, and as unseen in training."""
+
+
+@pytest.fixture(scope="module")
+def study():
+    return Study(load_pair(), Success(batch=len(SEEDS)))
+
+
+@pytest.fixture(scope="module")
+def nominal(study):
+    return study.run(SEEDS)
+
+
+def test_the_mug_ends_in_the_box(nominal):
+    """Most of the episodes succeed; the rate over 100 seeds is in the README."""
+    assert nominal["success_rate"] >= 0.75, nominal["toggle_error"]
+    for episode in nominal["episodes"]:
+        assert episode["success"] == (episode["failure"] is None)
+
+
+def test_images_matter(study, nominal):
+    """With pictures shuffled between episodes, toggles are far off and episodes fail."""
+    shown = {}
+
+    def predict(observation, episodes):
+        shown.update(zip(episodes, observation.image, strict=True))
+        other = [shown[(e + 1) % len(SEEDS)] for e in episodes]
+        return study.agent.predict(
+            observation._replace(image=np.array(other)), episodes
+        )
+
+    shuffled = study.run(SEEDS, predict=predict)
+    assert shuffled["success_rate"] < 0.2
+    right, wrong = (
+        result["toggle_error"]["per_toggle"]["grasp1"]["mean"]
+        for result in (nominal, shuffled)
+    )
+    assert wrong > 5 * right
+
+
+def test_nothing_privileged(study):
+    """With the picture frozen, moving the mug changes no bit of what the networks say."""
+    lanes = list(range(len(SEEDS)))
+    study.task.reset(lanes, SEEDS)
+    observation = study.task.observe(lanes)
+    keys = jax.vmap(jax.random.key)(np.arange(len(SEEDS), dtype=np.uint32))
+
+    def answers():
+        targets = study.agent.predict(observation, lanes)
+        chunk = np.zeros(len(SEEDS), np.int32)
+        return [
+            *targets,
+            *study.agent.propose(observation, targets, lanes, keys)(chunk),
+        ]
+
+    before = answers()
+    study.task.reset(lanes, [seed + 50 for seed in SEEDS])
+    assert any(study.task.mug(e)[0, 3] > 0 for e in lanes)
+    for first, second in zip(before, answers(), strict=True):
+        np.testing.assert_array_equal(first, second)
+
+
+def test_nothing_faked(study):
+    """No constraint holds the mug; without friction every episode fails."""
+    assert study.task.model.neq == 0
+    friction = study.task.model.geom_friction.copy()
+    study.task.model.geom_friction[:] = 0
+    try:
+        assert study.run(SEEDS)["successes"] == 0
+    finally:
+        study.task.model.geom_friction[:] = friction
+
+
+def test_nothing_recompiles(study, nominal):
+    """Planner, predictor and sampler are compiled once for a whole evaluation."""
+    compiled = []
+
+    def listen(event: str, seconds: float, **_) -> None:
+        if event == "/jax/core/compile/backend_compile_duration":
+            compiled.append(seconds)
+
+    jax.monitoring.register_event_duration_secs_listener(listen)
+    try:
+        study.run([seed + 1000 for seed in SEEDS])
+    finally:
+        jax.monitoring.clear_event_listeners()
+    assert compiled == []
