@@ -144,19 +144,22 @@ class MotionPlanner:
         return f"{pair[0]} and {pair[1]}, {1000 * distance:.1f} mm apart"
 
     def _nearest_free(self, worlds: World, q: np.ndarray) -> np.ndarray:
-        """`q` [P, d] where it is free or nothing near is, else the nearest free neighbour."""
+        """`q` [P, d], but the nearest free neighbour where it is in collision and has one.
+
+        Joints outside the limits, or not finite, are left for the search to refuse.
+        """
+        low, high = self.limits.q_min, self.limits.q_max
         problem = np.arange(len(q))
-        free = np.asarray(self._config_free(worlds, problem, q))
-        if free.all():
+        stuck = ~np.asarray(self._config_free(worlds, problem, q))
+        stuck &= np.all((low <= q) & (q <= high), axis=1)
+        if not stuck.any():
             return q
-        near = np.clip(
-            q[:, None] + self._offsets, self.limits.q_min, self.limits.q_max
-        ).astype(np.float32)
+        near = np.clip(q[:, None] + self._offsets, low, high).astype(np.float32)
         rows = near.reshape(-1, q.shape[1])
-        found = self._config_free(worlds, np.repeat(problem, NEIGHBOURS), rows)
-        found = np.asarray(found).reshape(-1, NEIGHBOURS)
-        best = near[problem, found.argmax(1)]
-        return np.where((~free & found.any(1))[:, None], best, q)
+        free = self._config_free(worlds, np.repeat(problem, NEIGHBOURS), rows)
+        free = np.asarray(free).reshape(-1, NEIGHBOURS)
+        nearest = near[problem, free.argmax(1)]
+        return np.where((stuck & free.any(1))[:, None], nearest, q)
 
 
 def _neighbours(joints: int) -> np.ndarray:
