@@ -63,6 +63,8 @@ class Camera:
         try:
             _use_headless_gl()
             self._renderer = mujoco.Renderer(model, height, width)
+        except NoGLError:
+            raise
         except (mujoco.FatalError, AttributeError, ImportError, RuntimeError) as error:
             raise NoGLError(f"{ADVICE} ({error})") from error
         # Without this the interpreter takes down EGL before the renderer that needs it.

@@ -1,0 +1,69 @@
+"""What the scripts in `eval/` share: intervals, seeds, toggle errors."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.stats import binomtest
+
+from jaxplan.evaluation import parse_seeds, versions, wilson
+from jaxplan.evaluation.success import episode_json
+from jaxplan.evaluation.toggle_error import ToggleError, summarize
+from jaxplan.rollout import EpisodeRecord
+
+
+def test_wilson_agrees_with_known_values():
+    assert wilson(0, 10) == pytest.approx((0.0, 0.2775), abs=1e-4)
+    assert wilson(8, 10) == pytest.approx((0.4902, 0.9433), abs=1e-4)
+
+
+@given(st.integers(1, 1000), st.data())
+def test_wilson_agrees_with_scipy(trials, data):
+    successes = data.draw(st.integers(0, trials))
+    expected = binomtest(successes, trials).proportion_ci(method="wilson")
+    assert wilson(successes, trials) == pytest.approx(expected, abs=1e-6)
+
+
+def test_an_interval_of_nothing_is_refused():
+    with pytest.raises(ValueError, match="at least one"):
+        wilson(0, 0)
+
+
+def test_seed_ranges():
+    assert parse_seeds("100000:100100") == range(100000, 100100)
+    assert parse_seeds("7") == range(7, 8)
+
+
+@pytest.mark.parametrize(
+    "text", ["", ":", "5:", ":5", "a:b", "1.5", "1:2:3", "5:5", "9:3", "-3:2", "0:2147483649"]
+)  # fmt: skip
+def test_seed_ranges_that_make_no_sense_are_refused(text):
+    with pytest.raises(ValueError, match="FIRST:END") as error:
+        parse_seeds(text)
+    assert repr(text) in str(error.value)
+
+
+def test_toggle_errors_are_summed_up_per_toggle():
+    errors = [
+        ToggleError(toggle=0, error=0.01, nearest=0.01),
+        ToggleError(toggle=0, error=0.03, nearest=0.02),
+        ToggleError(toggle=0, error=0.11, nearest=0.03),
+        ToggleError(toggle=3, error=0.05, nearest=0.04),
+    ]
+    summary = summarize(errors)
+    assert list(summary["per_toggle"]) == ["grasp1", "release2"]
+    first = summary["per_toggle"]["grasp1"]
+    assert first == pytest.approx({"mean": 0.05, "median": 0.03, "phases": 3})
+    assert summary["mean"] == pytest.approx(0.05)
+    assert summary["median"] == pytest.approx(0.04)
+    assert summary["nearest_toggle_mean"] == pytest.approx(0.025)
+    assert summarize([]) == {}
+
+
+def test_an_episode_that_never_moved_is_a_record_too():
+    episode = episode_json(EpisodeRecord(5, False, "outside", []))
+    assert episode["expansions"] == episode["planning_seconds"] == 0
+    assert episode["failure"] == "outside"
+
+
+def test_versions_name_what_computes():
+    assert {"jaxplan", "jax", "mujoco", "mujoco-mjx", "machine"} <= set(versions())
