@@ -15,7 +15,7 @@ from jaxplan.config import PlannerConfig, TrajectoryConfig
 from jaxplan.planning import PlanResult, Segment, make_planner
 from jaxplan.scene import Scene
 from jaxplan.scene.panda import JointLimits
-from jaxplan.trajectory import Rung, make_trajectory
+from jaxplan.trajectory import Rung, make_trajectory, points_free
 
 jit = partial(jax.jit, compiler_options=collision.XLA_OPTIONS)
 
@@ -149,17 +149,27 @@ class MotionPlanner:
         Joints outside the limits, or not finite, are left for the search to refuse.
         """
         low, high = self.limits.q_min, self.limits.q_max
-        problem = np.arange(len(q))
-        stuck = ~np.asarray(self._config_free(worlds, problem, q))
-        stuck &= np.all((low <= q) & (q <= high), axis=1)
-        if not stuck.any():
-            return q
-        near = np.clip(q[:, None] + self._offsets, low, high).astype(np.float32)
-        rows = near.reshape(-1, q.shape[1])
-        free = self._config_free(worlds, np.repeat(problem, NEIGHBOURS), rows)
-        free = np.asarray(free).reshape(-1, NEIGHBOURS)
-        nearest = near[problem, free.argmax(1)]
-        return np.where((stuck & free.any(1))[:, None], nearest, q)
+        free = self._free(worlds, np.arange(len(q)), q)
+        blocked = np.flatnonzero(~free)
+        near = np.clip(
+            q[blocked, None] + self._offsets, self.limits.q_min, self.limits.q_max
+        ).astype(np.float32)
+        rows = np.repeat(blocked, NEIGHBOURS)
+        found = self._free(worlds, rows, near.reshape(-1, q.shape[1]))
+        q = q.copy()
+        for lane, candidates, ok in zip(
+            blocked, near, found.reshape(-1, NEIGHBOURS), strict=True
+        ):
+            if ok.any():
+                q[lane] = candidates[ok.argmax()]
+        return q
+
+    def _free(self, worlds: World, problem: np.ndarray, q: np.ndarray) -> np.ndarray:
+        """Whether each configuration is free, in calls of the one compiled shape."""
+        config_free = partial(self._config_free, worlds)
+        return points_free(
+            config_free, problem, list(q[:, None]), self._trajectory.check_rows
+        )
 
 
 def _neighbours(joints: int) -> np.ndarray:
