@@ -1,6 +1,7 @@
 """What all tests share: JAX on the CPU, off-screen rendering, reproducible examples."""
 
 import os
+from typing import Any, NamedTuple
 
 # Set before JAX or MuJoCo is imported; a value from outside wins (for -m gpu).
 os.environ.setdefault("JAX_PLATFORMS", "cpu")
@@ -32,3 +33,48 @@ def mug_planner(mug_task):
 
     planner = PlannerConfig(p_uniform=1.0)
     return MotionPlanner(mug_task.planning_scene, PANDA_LIMITS, planner)
+
+
+class Demonstration(NamedTuple):
+    """A batch that the expert drove, and what was heard of it."""
+
+    seeds: range
+    records: list
+    phases: list
+    recorder: Any
+    certification: Any
+
+
+@pytest.fixture(scope="session")
+def demonstrate(mug_task, mug_planner):
+    """Lets the expert drive seeds, half of them with noise, and records them."""
+    from jaxplan.config import DemonstrationConfig
+    from jaxplan.evaluation.certification import Certification
+    from jaxplan.rollout import Targets, rollout
+    from jaxplan.tasks.mug.demonstrate import ExpertPolicy, Recorder
+
+    def run(seeds) -> Demonstration:
+        policy = ExpertPolicy(mug_task)
+        policy.reset(seeds)
+        recorder = Recorder(mug_task, policy, seeds, DemonstrationConfig())
+        certification, phases = Certification(mug_planner), []
+
+        def listen(phase):
+            for listener in (phases.append, recorder, certification):
+                listener(phase)
+
+        records = rollout(
+            mug_task,
+            seeds,
+            lambda observation, episodes: Targets(*policy(observation, episodes)),
+            mug_planner,
+            listen=listen,
+        )
+        return Demonstration(seeds, records, phases, recorder, certification)
+
+    return run
+
+
+@pytest.fixture(scope="session")
+def demonstration(demonstrate):
+    return demonstrate(range(4))
