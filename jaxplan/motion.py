@@ -150,16 +150,14 @@ class MotionPlanner:
         """
         low, high = self.limits.q_min, self.limits.q_max
         free = self._free(worlds, np.arange(len(q)), q)
-        blocked = np.flatnonzero(~free)
-        near = np.clip(
-            q[blocked, None] + self._offsets, self.limits.q_min, self.limits.q_max
-        ).astype(np.float32)
+        inside = np.all((low <= q) & (q <= high), axis=1)
+        blocked = np.flatnonzero(~free & inside)
+        near = np.clip(q[blocked, None] + self._offsets, low, high).astype(np.float32)
         rows = np.repeat(blocked, NEIGHBOURS)
         found = self._free(worlds, rows, near.reshape(-1, q.shape[1]))
+        found = found.reshape(-1, NEIGHBOURS)
         q = q.copy()
-        for lane, candidates, ok in zip(
-            blocked, near, found.reshape(-1, NEIGHBOURS), strict=True
-        ):
+        for lane, candidates, ok in zip(blocked, near, found, strict=True):
             if ok.any():
                 q[lane] = candidates[ok.argmax()]
         return q
@@ -168,7 +166,7 @@ class MotionPlanner:
         """Whether each configuration is free, in calls of the one compiled shape."""
         config_free = partial(self._config_free, worlds)
         return points_free(
-            config_free, problem, list(q[:, None]), self._trajectory.check_rows
+            config_free, problem.tolist(), list(q[:, None]), self._trajectory.check_rows
         )
 
 

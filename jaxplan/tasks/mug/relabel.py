@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from jaxplan.data import NO_PATH, PATH_POINTS, Shard, as_shard
+from jaxplan.tasks.mug.demonstrate import FRAME
 from jaxplan.tasks.mug.expert import Expert, Keyframes
 from jaxplan.tasks.mug.task import MugTask
 
@@ -70,19 +71,7 @@ class Relabeler:
 
     def shard(self, records: Sequence) -> Shard:
         """All frames, whether or not their episode succeeded; none has a path."""
-        columns = {
-            key: [frame[key] for frame in self._frames]
-            for key in (
-                "image",
-                "q",
-                "gripper",
-                "q_toggle",
-                "gripper_toggle",
-                "q_goal",
-                "toggle",
-                "seed",
-            )
-        }
+        columns = {name: [frame[name] for frame in self._frames] for name in FRAME}
         count = len(self._frames)
         return as_shard(
             **columns,
