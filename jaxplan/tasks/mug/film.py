@@ -1,5 +1,6 @@
 """Pictures of an episode for people: a film strip with a panel per phase, and a video."""
 
+import warnings
 from pathlib import Path
 from typing import NamedTuple
 
@@ -77,9 +78,11 @@ class Film:
         panels.append(picture(self._states[-1], []))
         _strip(panels).save(directory / "phases.png")
         frames = np.stack([picture(qpos, []) for qpos in self._states])
-        iio.imwrite(
-            directory / "episode.mp4", frames, fps=round(VIDEO_FPS), macro_block_size=1
-        )
+        video, fps = directory / "episode.mp4", round(VIDEO_FPS)
+        with warnings.catch_warnings():
+            # JAX warns of forks; this one becomes ffmpeg at once.
+            warnings.filterwarnings("ignore", "os.fork", RuntimeWarning)
+            iio.imwrite(video, frames, fps=fps, macro_block_size=1)
 
     def _record(self, episode: int, data: mujoco.MjData) -> None:
         self._ticks += 1
