@@ -66,14 +66,12 @@ def least_scores(scene: Scene, world: World, q: jax.Array, score: Score) -> jax.
         least = []
         for front, own, against in zip(fronts, facing, obstacles, strict=True):
             frame = poses[link_of[front.obstacles[0].body]]
-            near = relative(own, poses[np.array(front.links)], frame)
+            near = relative(own, poses, np.array(front.links), frame)
             function = FUNCTIONS[front.kinds]
             scores = reduce(smaller, [function(near, b, score) for b in against])
             scores = jnp.where(counts[np.array(front.groups)], scores, jnp.inf)
             least.append(jnp.min(scores, 0))
-        # The running minima do not keep a NaN, so it is caught here.
-        finite = jnp.isfinite(jnp.sum(poses, (0, 1, 2)))
-        return jnp.where(finite, reduce(smaller, least), jnp.nan)
+        return reduce(smaller, least)
 
     return _in_blocks(block, q, world)
 

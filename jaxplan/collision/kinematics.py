@@ -26,26 +26,20 @@ def link_poses(scene: Scene, world: World, q: jax.Array) -> jax.Array:
         `[1 + n_links, 3, 4, B]`: rotation and position [m] in the world; row 0 is the
         world itself.
     """
-    links, hand = scene.structure.links, _hand_row(scene)
-    carried = [
-        world.held[link.object] if link.object >= 0 else jnp.zeros(1, bool)
-        for link in links
-    ]
-    steps = (
-        jnp.arange(len(links)) + 1,
-        jnp.array([link.parent for link in links]),
-        _local_poses(scene, world, q),
-        jnp.stack(jnp.broadcast_arrays(*carried)),
-    )
-    world_frame = jnp.broadcast_to(jnp.eye(3, 4)[..., None], (3, 4, q.shape[-1]))
-    poses = jnp.zeros((len(links) + 1, *world_frame.shape)).at[0].set(world_frame)
-
-    def attach(poses: jax.Array, step: tuple[jax.Array, ...]) -> tuple[jax.Array, None]:
-        row, parent, local, held = step
-        base = jnp.where(held, poses[hand], poses[parent])
-        return poses.at[row].set(_compose(base, local)), None
-
-    return jax.lax.scan(attach, poses, steps)[0]
+    links = scene.structure.links
+    hand = scene.structure.link_of[int(scene.mj_model.body(scene.hand).id)]
+    objects = [row for row, link in enumerate(links, 1) if link.object >= 0]
+    first, last = (objects[0], objects[-1]) if objects else (len(links) + 1,) * 2
+    fixed = jnp.broadcast_to(jnp.eye(3, 4)[..., None], (3, 4, q.shape[-1]))
+    poses = jnp.zeros((1 + len(links), *fixed.shape)).at[0].set(fixed)
+    poses = _attach(scene, world, q, poses, range(1, first))
+    for row in objects:
+        index = links[row - 1].object
+        given = world.object_pose[index]
+        local = jnp.concatenate([rotation_of(given[3:]), given[:3, None]], 1)
+        base = jnp.where(world.held[index], poses[hand], fixed)
+        poses = poses.at[row].set(_compose(base, local))
+    return _attach(scene, world, q, poses, range(last + 1, len(links) + 1))
 
 
 def rotation_of(quat: jax.Array) -> jax.Array:
@@ -60,10 +54,6 @@ def rotation_of(quat: jax.Array) -> jax.Array:
     )
 
 
-def _hand_row(scene: Scene) -> int:
-    return scene.structure.link_of[int(scene.mj_model.body(scene.hand).id)]
-
-
 def _compose(a: jax.Array, b: jax.Array) -> jax.Array:
     """The frame b, given in a, in the world: `[3, 4, B]` each."""
     # Written out, because a batched matrix product is slow on CPU.
@@ -72,56 +62,44 @@ def _compose(a: jax.Array, b: jax.Array) -> jax.Array:
     return product + a[:, 3, None] * last
 
 
-def _local_poses(scene: Scene, world: World, q: jax.Array) -> jax.Array:
-    """`[n_links, 3, 4, B]` pose of each link in its parent."""
-    links = scene.structure.links
-    objects = [link for link in links if link.object >= 0]
-    if not objects:
-        return _joint_poses(scene, world, q, links)
-    first = links.index(objects[0])
-    given = world.object_pose[np.array([link.object for link in objects])]
-    given = jnp.broadcast_to(given, (*given.shape[:-1], q.shape[-1]))
-    rotation = jnp.moveaxis(rotation_of(jnp.moveaxis(given[:, 3:], 1, 0)), 2, 0)
-    parts = [
-        _joint_poses(scene, world, q, links[:first]),
-        jnp.concatenate([rotation, given[:, :3, None]], 2),
-        _joint_poses(scene, world, q, links[first + len(objects) :]),
-    ]
-    return jnp.concatenate(parts)
-
-
-def _joint_poses(
-    scene: Scene, world: World, q: jax.Array, links: tuple[Link, ...]
+def _attach(
+    scene: Scene, world: World, q: jax.Array, poses: jax.Array, rows: range
 ) -> jax.Array:
-    """`[n, 3, 4, B]` pose of links that a joint moves or none, all in one expression."""
-    model = scene.model
-    body, joint = (np.array([getattr(link, key) for link in links], int)
-                   for key in ("body", "joint"))  # fmt: skip
-    start = np.array([link.offset for link in links], bool)
-    slides = np.array([link.slides for link in links], bool)
-    offset = jnp.where(
-        start[:, None, None], _matrices(model.body_quat[body]), jnp.eye(3)
-    )
-    position = jnp.where(start[:, None], model.body_pos[body], 0)
-    axis, anchor = model.jnt_axis[joint], model.jnt_pos[joint]
+    """Fills in the poses of some links, each from its parent's."""
+    if not rows:
+        return poses
+    model, links = scene.model, scene.structure.links[rows.start - 1 : rows.stop - 1]
+    body = np.array([link.body for link in links])
+    joint = np.array([link.joint for link in links])
+    start = np.array([link.offset for link in links])
+    slides = np.array([link.slides for link in links])[:, None]
+    turn = jnp.where(start[:, None, None], _matrices(model.body_quat[body]), jnp.eye(3))
+    axis, anchor = model.jnt_axis[joint][..., None], model.jnt_pos[joint][..., None]
+    middle = jnp.where(start[:, None], model.body_pos[body], 0)[..., None]
     value = _values(scene, world, q, links)
-    angle = jnp.where(slides[:, None], 0, value)[:, None, None]
-    # Rodrigues, with the fixed offset multiplied in beforehand.
-    zero, (x, y, z) = jnp.zeros(len(links)), axis.T
-    cross = jnp.stack([zero, -z, y, z, zero, -x, -y, x, zero], -1).reshape(-1, 3, 3)
-    square = axis[:, :, None] * axis[:, None] - jnp.eye(3)
-    rotation = (
-        offset[..., None]
-        + (offset @ cross)[..., None] * jnp.sin(angle)
-        + (offset @ square)[..., None] * (1 - jnp.cos(angle))
+    angle, shift = jnp.where(slides, 0, value), jnp.where(slides, value, 0)
+    # Rodrigues: R = turn (1 + sin K + (1 - cos) K^2), about the anchor.
+    cross = jnp.cross(axis, jnp.eye(3), axisa=1, axisc=1)
+    constants = turn, turn @ cross, turn @ cross @ cross, anchor
+    steps = (
+        jnp.array(rows),
+        jnp.array([link.parent for link in links]),
+        [constant[..., None] for constant in constants],
+        (turn @ anchor + middle)[..., None],
+        (turn @ axis)[..., None],
+        jnp.sin(angle),
+        1 - jnp.cos(angle),
+        shift,
     )
-    shift = jnp.where(slides[:, None], value, 0)[:, None]
-    along = (offset @ axis[..., None]) * shift
-    fixed = position + (offset @ anchor[..., None])[..., 0]
-    swept = sum(rotation[:, :, k] * anchor[:, None, k, None] for k in range(3))
-    return jnp.concatenate(
-        [rotation, (fixed[..., None] + along - swept)[:, :, None]], 2
-    )
+
+    def attach(poses: jax.Array, step: tuple) -> tuple[jax.Array, None]:
+        row, parent, (turn, once, twice, anchor), middle, along, sin, versin, far = step
+        rotation = turn + once * sin + twice * versin
+        swept = sum(rotation[:, k, None] * anchor[k] for k in range(3))
+        local = jnp.concatenate([rotation, middle + along * far - swept], 1)
+        return poses.at[row].set(_compose(poses[parent], local)), None
+
+    return jax.lax.scan(attach, poses, steps)[0]
 
 
 def _matrices(quats: jax.Array) -> jax.Array:

@@ -68,24 +68,36 @@ def read(scene: Scene, ids: tuple[int, ...]) -> Shapes:
     )
 
 
-def relative(shapes: Shapes, pose: jax.Array, frame: jax.Array) -> Shapes:
+def relative(
+    shapes: Shapes, poses: jax.Array, rows: np.ndarray, frame: jax.Array
+) -> Shapes:
     """Geoms in another frame than that of their bodies.
 
     Args:
         shapes: Geoms in the frames of their bodies.
-        pose: `[n, 3, 4, B]` pose of each geom's body in the world.
+        poses: `[n_links, 3, 4, B]` poses in the world.
+        rows: `[n]` the link of each geom.
         frame: `[3, 4, B]` the other frame.
     """
-    moved = _turn(pose, shapes.centre)
+
+    def turn(vector: Vector) -> Vector:
+        return [_sum(pose[:, i, k] * vector[k] for k in range(3)) for i in range(3)]
+
+    def turn_back(vector: Vector) -> Vector:
+        return [_sum(frame[k, i] * vector[k] for k in range(3)) for i in range(3)]
+
+    # One gather: XLA vectorises what reads one array, not what reads twelve.
+    pose = poses[rows]
+    moved = turn(shapes.centre)
     offset = [moved[i] + pose[:, i, 3] - frame[i, 3] for i in range(3)]
-    axes = [_turn_back(frame, _turn(pose, axis)) for axis in shapes.axes]
-    return Shapes(_turn_back(frame, offset), axes, shapes.size)
+    axes = [turn_back(turn(axis)) for axis in shapes.axes]
+    return Shapes(turn_back(offset), axes, shapes.size)
 
 
 def smaller(a: jax.Array, b: jax.Array | float) -> jax.Array:
     """Minimum in one instruction, where `jnp.minimum` takes three to keep NaN.
 
-    NaN is caught once, in the poses.
+    NaN is looked for in what comes in (`queries`).
     """
     return jnp.where(a < b, a, b)
 
@@ -95,12 +107,8 @@ def larger(a: jax.Array, b: jax.Array | float) -> jax.Array:
     return jnp.where(a > b, a, b)
 
 
-def _turn(pose: jax.Array, vector: Vector) -> Vector:
-    return [sum(pose[..., i, k, :] * vector[k] for k in range(3)) for i in range(3)]
-
-
-def _turn_back(pose: jax.Array, vector: Vector) -> Vector:
-    return [sum(pose[..., k, i, :] * vector[k] for k in range(3)) for i in range(3)]
+def _sum(terms: Iterable[jax.Array]) -> jax.Array:
+    return reduce(jnp.add, terms)
 
 
 def _dot(a: Vector, b: Vector) -> jax.Array:

@@ -28,7 +28,8 @@ def clearance(
         backend: Who answers.
 
     Returns:
-        `[...]` [m], negative = penetration; NaN where q or the world is not finite.
+        `[...]` [m], negative = penetration; NaN where q or the world is not finite, or a
+        quaternion is zero.
     """
     return _flat(scene, world, q, Score(exact=True), backend)
 
@@ -102,6 +103,7 @@ def _flat(
     shape = batch_shape(world, q)
     finite = jnp.isfinite(q).all(-1)
     finite &= jnp.isfinite(world.object_pose).all((-2, -1))
+    finite &= (world.object_pose[..., 3:] != 0).any(-1).all(-1)  # a rotation
     finite &= jnp.isfinite(world.passive).all(-1)
     flat = World(
         _batch_last(world.object_pose, shape, 2),
