@@ -8,6 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxplan.learning import Weights
+from jaxplan.motion import jit
 from jaxplan.networks import Cond, predict
 from jaxplan.planning import Segment
 from jaxplan.rollout import Targets
@@ -47,7 +48,7 @@ class Agent:
         def upper(image, q, gripper):
             return predict(predictor.config, predictor.params, image, q, gripper)
 
-        @jax.jit
+        @jit
         def segments(cond, keys, chunk):
             keys = jax.vmap(jax.random.fold_in)(keys, chunk)
             return diffusion.draw(config, sampler.params, cond, keys, BANK)
@@ -75,9 +76,13 @@ class Agent:
         image, q, gripper = (self._pad(column, episodes) for column in observation)
         targets = Targets(*(self._pad(column, episodes) for column in targets))
         cond = Cond(
-            image if self._own_encoder else self._features,
-            q, gripper, targets.q_toggle, targets.gripper_toggle, targets.q_goal,
-        )  # fmt: skip
+            image=jnp.asarray(image if self._own_encoder else self._features),
+            q=jnp.asarray(q),
+            gripper=jnp.asarray(gripper),
+            q_toggle=jnp.asarray(targets.q_toggle),
+            gripper_toggle=jnp.asarray(targets.gripper_toggle),
+            q_goal=jnp.asarray(targets.q_goal),
+        )
         return lambda chunk: self.segments(cond, keys, jnp.asarray(chunk))
 
     def _pad(self, column: np.ndarray, episodes: list[int]) -> np.ndarray:

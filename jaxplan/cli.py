@@ -50,8 +50,8 @@ def _solve(command: Solve) -> int:
         from jaxplan.learning.pretrained import DIRECTORY
         from jaxplan.solve import solve
     weights = load_pair(command.weights or DIRECTORY)
-    record = solve(command.seed, weights, command.out)
-    return 0 if record.success else 1
+    episode = solve(command.seed, weights, command.out)
+    return 0 if episode["success"] else 1
 
 
 def _fail(message: str) -> int:

@@ -29,7 +29,7 @@ class PlannerConfig:
     goal_tolerance: float = 0.05
     """A node reaches q_goal within this distance [rad]."""
     goal_connect: float = 0.3
-    """An accepted node nearer to q_goal than this tries the straight motion there [rad]; 0 = off."""
+    """An accepted node this near to q_goal [rad] tries the straight motion there; 0 = off."""
     goal_tree: Literal["mirrored", "uniform"] = "mirrored"
     """RRT-Connect's second tree: learned segments reversed, or uniform ones only."""
     toggle_tie_break: float = 0.0

@@ -145,6 +145,8 @@ Predict = Callable[[Any, list[int]], Targets]
 """(observation, episodes) -> targets of these episodes."""
 Propose = Callable[[Any, Targets, list[int], jax.Array], Callable[[jax.Array], Segment]]
 """(observation, targets, episodes, keys [P]) -> draw(chunk [P]) -> Segment [P, M]."""
+STILL = 0.005
+"""A motion in which no joint moves by more [rad] is none."""
 HOLD = 0.5
 """The judge looks this long after the hand has left [s]."""
 
@@ -250,21 +252,27 @@ def _plan(
     touching[running] |= last
     worlds = task.worlds(touching)
     keys = _keys(batch.seeds, task.batch, number)
+    draw_bank = propose and propose(observation, targets, running, keys)
     segments: list[Segment] = []
-    draw = None
-    if propose is not None:
-        draw_bank = propose(observation, targets, running, keys)
 
-        def draw(chunk: jax.Array) -> Segment:
-            segments.append(draw_bank(chunk))
-            return segments[-1]
+    def draw(chunk: jax.Array) -> Segment:
+        assert draw_bank is not None
+        segments.append(draw_bank(chunk))
+        return segments[-1]
 
     # Lanes that are not running are padding, so that nothing recompiles.
     query = np.zeros((3, task.batch, observation.q.shape[1]), np.float32)
     query[:, running] = observation.q, targets.q_goal, targets.q_toggle
-    active = np.isin(np.arange(task.batch), running)
-    speed = np.where(task.closed, config.carry_speed, 1.0)
-    motion = planner.plan(worlds, *query, keys, draw, active, speed)
+    motion = planner.plan(
+        worlds,
+        q_start=query[0],
+        q_goal=query[1],
+        q_toggle=query[2],
+        keys=keys,
+        draw=None if draw_bank is None else draw,
+        active=np.isin(np.arange(task.batch), running),
+        speed=np.where(task.closed, config.carry_speed, 1.0),
+    )
     return Phase(
         number=number,
         episodes=running,
@@ -291,7 +299,7 @@ def _execute(batch: _Batch, phase: Phase) -> set[int]:
     }
     task.toggle(list(close), list(close.values()))
     for e in phase.episodes:
-        moved = e in phase.executed
+        moved = e in phase.executed and np.ptp(phase.motion.q[e], axis=0).max() > STILL
         batch.stuck[e] = 0 if moved or e in close else batch.stuck[e] + 1
         batch.touched[e] = e in close or (batch.touched[e] and not moved)
     return set(close)
@@ -339,6 +347,8 @@ def _obstacle(planner: MotionPlanner, phase: Phase, episode: int) -> str:
     """Why an episode found no motion: the search's status, and what is in the way."""
     row = phase.episodes.index(episode)
     status = Status(phase.motion.result.status[episode]).name
+    if phase.executed.count(episode):
+        return f"no motion in phase {phase.number + 1}: the subgoal is where the arm is"
     at_start = planner.reason(phase.worlds, episode, phase.observation.q[row])
     at_goal = planner.reason(phase.worlds, episode, phase.targets.q_goal[row])
     return (

@@ -1,22 +1,19 @@
 """One episode for people: a line per phase, `episode.json`, a video and a film strip."""
 
+import dataclasses
 import json
 import os
 import time
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from jaxplan.agent import Agent
-from jaxplan.evaluation import Success, versions
-from jaxplan.evaluation.success import episode_json
+from jaxplan.evaluation import Study, Success
 from jaxplan.learning import Weights
-from jaxplan.motion import MotionPlanner
 from jaxplan.planning import Status
-from jaxplan.rollout import EpisodeRecord, Phase, rollout
-from jaxplan.scene.panda import PANDA_LIMITS
+from jaxplan.rollout import Phase
 from jaxplan.tasks.mug.film import Film
-from jaxplan.tasks.mug.task import MugTask
 
 
 def solve(
@@ -24,7 +21,7 @@ def solve(
     weights: tuple[Weights, Weights],
     out: str | os.PathLike | None = None,
     config: Success = Success(),
-) -> EpisodeRecord:
+) -> dict[str, Any]:
     """Plans and executes one mug episode with learned weights.
 
     Args:
@@ -32,16 +29,15 @@ def solve(
         weights: Predictor and sampler.
         out: Directory for `episode.json`, `episode.mp4` and `phases.png`; None writes nothing.
         config: Settings, as of the success study.
+
+    Returns:
+        The episode as in `episode.json`.
     """
-    task = MugTask(1, config.camera, config.friction)
-    planner = MotionPlanner(
-        task.planning_scene, PANDA_LIMITS, config.planner, config.trajectory
-    )
-    agent = Agent(*weights, 1, config.inference_steps)
+    study = Study(weights, dataclasses.replace(config, batch=1))
     film, directory = None, None if out is None else Path(out)
     if directory is not None:
         directory.mkdir(parents=True, exist_ok=True)
-        film = Film(task)
+        film = Film(study.task)
     clock = time.perf_counter()
 
     def listen(phase: Phase) -> None:
@@ -52,20 +48,19 @@ def solve(
             film.add_phase(phase)
         clock = time.perf_counter()
 
-    record = rollout(
-        task, [seed], agent.predict, planner, agent.propose, config.rollout, listen
-    )[0]
+    result = study.run([seed], listen=listen)
+    episode = result["episodes"][0]
+    verdict = "success" if episode["success"] else f"failed: {episode['failure']}"
     print(
-        f"seed {seed}: {'success' if record.success else f'failed: {record.failure}'}, "
-        f"{len(record.phases)} phases, {record.expansions} expansions, "
-        f"{record.planning_seconds:.2f} s of search"
+        f"seed {seed}: {verdict}, {len(episode['phases'])} phases, "
+        f"{episode['expansions']} expansions, {episode['planning_seconds']:.2f} s of search"
     )
     if film is not None and directory is not None:
-        episode = {**episode_json(record), "versions": versions()}
+        episode |= {"weights": result["weights"], "versions": result["versions"]}
         (directory / "episode.json").write_text(json.dumps(episode, indent=1) + "\n")
         film.write(directory)
         print(f"written: {directory / 'episode.json'}, episode.mp4, phases.png")
-    return record
+    return episode
 
 
 def _line(phase: Phase, period: float, seconds: float) -> str:

@@ -14,6 +14,7 @@ from jaxplan.learning import Weights
 from jaxplan.motion import MotionPlanner
 from jaxplan.rollout import EpisodeRecord, Phase, Predict, rollout
 from jaxplan.scene.panda import PANDA_LIMITS
+from jaxplan.simulation.physics import CONTROL_PERIOD
 from jaxplan.tasks.mug.task import MugTask
 
 
@@ -44,12 +45,19 @@ class Study:
     def __init__(
         self, weights: tuple[Weights, Weights], config: Success = Success()
     ) -> None:
+        if config.trajectory.control_period != CONTROL_PERIOD:
+            raise ValueError(
+                f"control_period {config.trajectory.control_period}: "
+                f"the simulation plays at {CONTROL_PERIOD} s"
+            )
         self.config, self._weights = config, weights
         self.task = MugTask(config.batch, config.camera, config.friction)
         self.planner = MotionPlanner(
             self.task.planning_scene, PANDA_LIMITS, config.planner, config.trajectory
         )
         self.agent = Agent(*weights, config.batch, config.inference_steps)
+        # One phase of one episode compiles all, so that no planning time includes it.
+        self._rollout([0], RolloutConfig(max_phases=1))
 
     def run(
         self,
@@ -80,15 +88,7 @@ class Study:
         records: list[EpisodeRecord] = []
         for first in range(0, len(seeds), self.config.batch):
             part = seeds[first : first + self.config.batch]
-            records += rollout(
-                self.task,
-                part,
-                predict or self.agent.predict,
-                self.planner,
-                self.agent.propose,
-                self.config.rollout,
-                heard,
-            )
+            records += self._rollout(part, self.config.rollout, predict, heard)
             errors.finish()
             progress(len(part))
         seconds = time.perf_counter() - start
@@ -96,6 +96,24 @@ class Study:
             "toggle_error": errors.summary(),
             "seconds": seconds,
         }
+
+    def _rollout(
+        self,
+        seeds: Sequence[int],
+        config: RolloutConfig,
+        predict: Predict | None = None,
+        listen: Callable[[Phase], None] | None = None,
+    ) -> list[EpisodeRecord]:
+        """One batch."""
+        return rollout(
+            self.task,
+            seeds,
+            predict or self.agent.predict,
+            self.planner,
+            self.agent.propose,
+            config,
+            listen,
+        )
 
     def _result(self, records: list[EpisodeRecord]) -> dict[str, Any]:
         successes = sum(record.success for record in records)
