@@ -69,7 +69,7 @@ def test_without_gl_it_says_what_to_install(refused, monkeypatch):
             self.predict = self.propose = None
 
     monkeypatch.setattr("jaxplan.learning.load_pair", lambda _: (None, None))
-    monkeypatch.setattr("jaxplan.solve.Agent", Blind)
+    monkeypatch.setattr("jaxplan.evaluation.success.Agent", Blind)
     monkeypatch.delenv("MUJOCO_GL", raising=False)
     monkeypatch.delenv("DISPLAY", raising=False)
     monkeypatch.setattr(ctypes.util, "find_library", lambda name: None)

@@ -118,7 +118,7 @@ def test_a_mug_outside_the_range_is_a_failure(mug_task, mug_planner, monkeypatch
     assert "outside the range" in (records[1].failure or "")
     assert records[1].phases == []
     assert set(asked) == {0, 2}
-    assert all("not finished" in (records[e].failure or "") for e in (0, 2))
+    assert all("no motion" in (records[e].failure or "") for e in (0, 2))
 
 
 def test_a_prediction_that_is_not_finite_moves_nothing(mug_task, mug_planner):
