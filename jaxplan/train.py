@@ -144,7 +144,8 @@ def _read(config: TrainConfig) -> tuple[data.Shard, dict[str, str]]:
     shards = [data.read_demonstrations(directory) for directory in config.data]
     shard = shards[0] if len(shards) == 1 else data.concatenate(shards)
     logger.info("%d frames of %d episodes", len(shard.q), len(shard.episode_seed))
-    hashes = {d: data.sha256(Path(d) / "manifest.json") for d in config.data}
+    # By name: where a machine keeps its data says nothing to anybody else.
+    hashes = {Path(d).name: data.sha256(Path(d) / "manifest.json") for d in config.data}
     return shard, hashes
 
 
@@ -179,6 +180,8 @@ def _export(
     directory = RUNS / config.name / "weights" if config.out is None else config.out
     training = dataclasses.asdict(dataclasses.replace(config, out=None))
     training.pop("network")  # `save_weights` records it
+    for paths in ("data", "init", "predictor"):
+        training.pop(paths, None)  # the checksums say it without a machine's paths
     info = {"data": hashes, "metrics": metrics, "training": training, **(extra or {})}
     return learning.save_weights(directory, kind, params, config.network, info)
 
