@@ -140,7 +140,7 @@ def _add_cameras(scene: mujoco.MjSpec) -> None:
         fovy=50,
         quat=_camera_quat(forward=[-np.sin(tilt), 0, np.cos(tilt)], up=[-1, 0, 0]),
     )
-    target, eye = np.array([0.42, -0.08, 0.1]), np.array([1.25, -0.55, 0.75])
+    target, eye = np.array([0.3, -0.05, 0.22]), np.array([1.5, -0.85, 0.9])
     scene.worldbody.add_camera(
         name="static", pos=eye, fovy=45, quat=_camera_quat(target - eye, up=[0, 0, 1])
     )
