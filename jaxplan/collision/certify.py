@@ -3,11 +3,11 @@
 import copy
 import math
 from collections.abc import Iterator
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-import jax
 import mujoco
 import numpy as np
+import numpy.typing as npt
 
 from jaxplan.collision.world import World, batch_shape, object_address
 from jaxplan.scene import Scene
@@ -31,7 +31,7 @@ class Certificate(NamedTuple):
 def certify(
     scene: Scene,
     world: World,
-    path: jax.typing.ArrayLike,
+    path: npt.ArrayLike,
     resolution: float = 0.01,
     tolerance: float = 0.001,
 ) -> Certificate:
@@ -60,7 +60,7 @@ def certify(
 
 
 def closest_pair(
-    scene: Scene, world: World, q: jax.typing.ArrayLike, reach: float = 0.1
+    scene: Scene, world: World, q: npt.ArrayLike, reach: float = 0.1
 ) -> tuple[tuple[str, str] | None, float]:
     """The pair of geoms that is nearest to each other, by name, and its distance [m].
 
@@ -76,7 +76,7 @@ def closest_pair(
 
 
 def clearance_mujoco(
-    scene: Scene, world: World, q: jax.typing.ArrayLike, reach: float = 0.05
+    scene: Scene, world: World, q: npt.ArrayLike, reach: float = 0.05
 ) -> np.ndarray:
     """As `clearance`, by C MuJoCo; distances beyond `reach` come out as inf.
 
@@ -177,7 +177,7 @@ def _nearest(
         data.qpos[:] = qpos[i]
         mujoco.mj_kinematics(model, data)
         if worlds.held[i].any():
-            carry(scene, data, worlds.held[i])
+            carry(scene, data, np.asarray(worlds.held[i]))
             mujoco.mj_kinematics(model, data)
         mujoco.mj_collision(model, data)
         geoms, distance = data.contact.geom, data.contact.dist
@@ -201,7 +201,7 @@ def _names(scene: Scene, geoms: tuple[int, int] | None) -> tuple[str, str] | Non
 def _rows(world: World, shape: tuple[int, ...]) -> World:
     """The world's leaves as `[n, ...]` NumPy arrays, n = size of the shape."""
 
-    def one(leaf: jax.Array, own: int) -> np.ndarray:
+    def one(leaf: Any, own: int) -> Any:
         tail = leaf.shape[leaf.ndim - own :]
         rows = np.broadcast_to(np.asarray(leaf), (*shape, *tail))
         return rows.reshape(math.prod(shape), *tail)

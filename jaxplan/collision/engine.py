@@ -5,8 +5,9 @@ minimum instead of boolean reductions (performance: 10x over the plain form).
 """
 
 from collections import defaultdict
+from collections.abc import Callable
 from functools import reduce
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -17,7 +18,7 @@ from jaxplan.collision.narrow import FUNCTIONS, Score, read, relative, smaller
 from jaxplan.collision.world import World
 from jaxplan.scene import Geoms, Scene
 
-XLA_OPTIONS = {"xla_cpu_use_fusion_emitters": False}
+XLA_OPTIONS: dict[str, str | bool] = {"xla_cpu_use_fusion_emitters": False}
 """Compiler options for the outermost `jax.jit` of anything that checks collisions: with
 XLA's CPU fusion emitters, kinematic chains are recomputed for every use (100x slower)."""
 
@@ -102,7 +103,9 @@ def _counts(scene: Scene, world: World) -> jax.Array:
     return ~world.ignored & (jnp.stack(held) | ~needs[:, None])
 
 
-def _in_blocks(function, q: jax.Array, world: World) -> jax.Array:
+def _in_blocks(
+    function: Callable[[jax.Array, World], jax.Array], q: jax.Array, world: World
+) -> jax.Array:
     """`function(q, world)` on blocks of the batch, one after the other on a CPU."""
     rows = q.shape[-1]
     blocks = -(-rows // BLOCK)
@@ -110,7 +113,7 @@ def _in_blocks(function, q: jax.Array, world: World) -> jax.Array:
         return function(q, world)
     width = -(-rows // blocks)
 
-    def split(leaf: jax.Array) -> jax.Array | None:
+    def split(leaf: jax.Array) -> Any:  # None: the whole batch shares it
         if leaf.shape[-1] == 1:
             return None
         padding = [(0, 0)] * (leaf.ndim - 1) + [(0, blocks * width - rows)]

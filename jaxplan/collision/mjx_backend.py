@@ -4,6 +4,8 @@ Slow (DESIGN: 400 to 40,000 configurations/s); it is here to check the fast one,
 for pairs of kinds that the fast one lacks.
 """
 
+from typing import Any
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -43,11 +45,10 @@ def least_distances(scene: Scene, world: World, q: jax.Array) -> jax.Array:
         index = groups[contact.geom[:, 0], contact.geom[:, 1]]
         return jnp.min(jnp.where(counts[index], contact.dist, jnp.inf))
 
-    axes = World(*(None if leaf.shape[-1] == 1 else -1 for leaf in world))
-    world = World(
-        *(x[..., 0] if a is None else x for a, x in zip(axes, world, strict=True))
-    )
-    return jax.vmap(one, (-1, axes))(q, world)
+    shared: list[Any] = [None if leaf.shape[-1] == 1 else -1 for leaf in world]
+    axes = World(*shared)
+    own = [x[..., 0] if a is None else x for a, x in zip(axes, world, strict=True)]
+    return jax.vmap(one, (-1, axes))(q, World(*own))
 
 
 def _qpos(scene: Scene, world: World, q: jax.Array) -> jax.Array:

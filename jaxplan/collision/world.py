@@ -6,6 +6,7 @@ from typing import NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
+import numpy.typing as npt
 
 from jaxplan.scene import Scene
 
@@ -29,9 +30,9 @@ class World(NamedTuple):
 
 def make_world(
     scene: Scene,
-    object_pose: jax.typing.ArrayLike | None = None,
-    held: jax.typing.ArrayLike | None = None,
-    passive: jax.typing.ArrayLike | None = None,
+    object_pose: npt.ArrayLike | None = None,
+    held: npt.ArrayLike | None = None,
+    passive: npt.ArrayLike | None = None,
     ignored: Iterable[str] = (),
 ) -> World:
     """A world; what is not given is as in the model's reference pose.
@@ -61,7 +62,7 @@ def make_world(
     )
 
 
-def batch_shape(world: World, q: jax.Array) -> tuple[int, ...]:
+def batch_shape(world: World, q: jax.Array | np.ndarray) -> tuple[int, ...]:
     """Common leading shape of the world's leaves and of q `[..., d]`."""
     return jnp.broadcast_shapes(
         q.shape[:-1],

@@ -10,7 +10,6 @@ import dataclasses
 from collections.abc import Iterable, Sequence
 from functools import partial
 from os import PathLike
-from pathlib import Path
 
 import jax
 import jax.numpy as jnp
@@ -53,13 +52,15 @@ class Scene:
         Raises:
             ValueError: A joint or body is not in the model, or cannot be planned for.
         """
-        if isinstance(source, mujoco.MjSpec):
-            source = source.compile()
-        elif isinstance(source, str) and "<mujoco" in source:
-            source = mujoco.MjModel.from_xml_string(source)
-        elif not isinstance(source, mujoco.MjModel):
-            source = mujoco.MjModel.from_xml_path(str(Path(source)))
-        return cls(mjx.put_model(source), read_structure(source, joints, hand))
+        if isinstance(source, mujoco.MjModel):
+            model = source
+        elif not isinstance(source, str | PathLike):
+            model = source.compile()
+        elif "<mujoco" in str(source):
+            model = mujoco.MjModel.from_xml_string(str(source))
+        else:
+            model = mujoco.MjModel.from_xml_path(str(source))
+        return cls(mjx.put_model(model), read_structure(model, joints, hand))
 
     def replace(self, **fields: jax.Array) -> "Scene":
         """The scene with fields of its `mjx.Model` replaced, e.g. `geom_pos`.
