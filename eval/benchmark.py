@@ -2,9 +2,10 @@
 
     python eval/benchmark.py --out runs/benchmark.json
 
-Sides take turns within each round, so that a busy machine slows all of them alike; what counts
-is the ratio. Cores that a side really got are measured too. Compilation is timed apart. Peers get the same geoms and the same pairs, joint
-states prepared beforehand, and are spared what the question does not need (friction).
+Sides take turns within each round, so that a busy machine slows all of them alike; what
+counts is the ratio. Cores that a side really got are measured too. Compilation is timed
+apart. Peers get the same geoms and the same pairs, joint states prepared beforehand, and
+are spared what the question does not need (friction).
 """
 
 import json

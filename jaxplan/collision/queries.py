@@ -13,7 +13,9 @@ from jaxplan.collision.world import World, batch_shape
 from jaxplan.scene import Scene
 
 Backend = Literal["fast", "mjx"]
-"""`fast`: our narrow phase. `mjx`: `mjx.collision`, slow, for reference."""
+"""`fast`: our narrow phase. `mjx`: `mjx.collision`, slow, for reference. Its distance
+between a convex geom and what does not touch it may be too large, so that of its answers
+only those about contact itself (margin 0) and the depth of penetration are to be relied on."""
 
 
 def clearance(
