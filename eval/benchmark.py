@@ -23,7 +23,6 @@ import jax.numpy as jnp
 import mujoco
 import numpy as np
 import tyro
-from mujoco import mjx
 from mujoco.batch import Batch
 from tqdm import tqdm
 
@@ -31,6 +30,7 @@ from jaxplan.collision import XLA_OPTIONS, World, clearance, config_free, make_w
 from jaxplan.collision.certify import carry, qpos_rows
 from jaxplan.evaluation import versions
 from jaxplan.scene import Scene, find_contacts, geom_pairs
+from jaxplan.scene.quiet_mjx import mjx
 from jaxplan.tasks.mug.scene import build
 
 OURS = "jaxplan config_free"

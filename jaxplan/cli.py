@@ -1,8 +1,6 @@
 """The command `jaxplan`."""
 
-import contextlib
 import difflib
-import io
 import sys
 from dataclasses import dataclass
 from pathlib import Path
@@ -45,10 +43,11 @@ def main(arguments: list[str] | None = None) -> int:
 def _solve(command: Solve) -> int:
     if not 0 <= command.seed < 2**31:
         raise ValueError(f"seed {command.seed}: expected 0 to {2**31 - 1}")
-    with contextlib.redirect_stdout(io.StringIO()):  # `import mujoco.mjx` prints
-        from jaxplan.learning import load_pair
-        from jaxplan.learning.pretrained import DIRECTORY
-        from jaxplan.solve import solve
+    # Here, so that `--help` and a typo answer at once.
+    from jaxplan.learning import load_pair
+    from jaxplan.learning.pretrained import DIRECTORY
+    from jaxplan.solve import solve
+
     weights = load_pair(command.weights or DIRECTORY)
     episode = solve(command.seed, weights, command.out)
     return 0 if episode["success"] else 1

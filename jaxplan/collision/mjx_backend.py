@@ -9,10 +9,10 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
-from mujoco import mjx
 
 from jaxplan.collision.world import World, object_address
 from jaxplan.scene import Scene
+from jaxplan.scene.quiet_mjx import mjx
 
 
 def least_distances(scene: Scene, world: World, q: jax.Array) -> jax.Array:

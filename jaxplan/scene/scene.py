@@ -15,9 +15,9 @@ import jax
 import jax.numpy as jnp
 import mujoco
 import numpy as np
-from mujoco import mjx
 
 from jaxplan.scene.contacts import geom_pairs
+from jaxplan.scene.quiet_mjx import mjx
 from jaxplan.scene.structure import Group, Structure, known, read_structure
 
 
