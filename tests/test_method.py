@@ -29,7 +29,10 @@ def test_the_mug_ends_in_the_box(nominal):
 
 
 def test_images_matter(study, nominal):
-    """With pictures shuffled between episodes, toggles are far off and episodes fail."""
+    """With pictures shuffled between episodes, toggles are far off and episodes fail.
+
+    The median, since the phases of an episode that has lost its mug would rule a mean.
+    """
     shown = {}
 
     def predict(observation, episodes):
@@ -42,7 +45,7 @@ def test_images_matter(study, nominal):
     shuffled = study.run(SEEDS, predict=predict)
     assert shuffled["success_rate"] < 0.2
     right, wrong = (
-        result["toggle_error"]["per_toggle"]["grasp1"]["mean"]
+        result["toggle_error"]["per_toggle"]["grasp1"]["median"]
         for result in (nominal, shuffled)
     )
     assert wrong > 5 * right

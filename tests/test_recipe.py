@@ -104,7 +104,7 @@ def test_an_empty_seed_range_is_refused(weights):
         sys.executable, "eval/success.py", "--seeds", "5:5", "--weights", str(weights)
     )
     assert done.returncode == 2
-    assert "empty" in done.stderr
+    assert "FIRST < END" in done.stderr
     assert "Traceback" not in done.stderr
 
 
