@@ -55,6 +55,11 @@ class RolloutConfig:
     max_phases: int = 24
     merge_distance: float = 0.1
     """A predicted subgoal this near to the toggle [rad] becomes the toggle."""
+    toggle_tolerance: float = 0.1
+    """The gripper toggles where every joint is this near to q_toggle [rad]: a mug that already
+    stands on the table may stop the hand a little before it."""
+    stall_phases: int = 4
+    """After so many phases without a toggle the subgoal is the toggle itself."""
     max_stuck: int = 2
     """Phases in a row without a motion after which an episode has failed."""
     carry_speed: float = 0.6

@@ -77,8 +77,8 @@ class Task(Protocol):
         """Joints of a hand that has backed off [rad]."""
         ...
 
-    def arrived(self, episode: int, q: np.ndarray) -> bool:
-        """Whether the arm is at `q`."""
+    def arrived(self, episode: int, q: np.ndarray, tolerance: float) -> bool:
+        """Whether every joint is this near to `q` [rad]."""
         ...
 
     def failure(self, episode: int) -> str | None:
@@ -182,7 +182,7 @@ def rollout(
         phase = _plan(batch, number, predict, planner, propose, config)
         if listen is not None:
             listen(phase)
-        toggled = _execute(batch, phase)
+        toggled = _execute(batch, phase, config.toggle_tolerance)
         _record(batch, phase, toggled)
         for e in list(batch.running):
             if e in phase.leaving and e in phase.executed:
@@ -203,6 +203,8 @@ class _Batch:
         self.failures: dict[int, str | None] = {}
         self.stuck = np.zeros(task.batch, int)
         """Phases in a row without a motion."""
+        self.since_toggle = np.zeros(task.batch, int)
+        """Phases since the gripper last toggled."""
         self.touched = np.zeros(task.batch, bool)
         """The last act was a toggle: the next motion leaves what the hand touched."""
         self.running = list(range(len(seeds)))
@@ -242,6 +244,9 @@ def _plan(
     leaving = [e for e in running if task.in_terminal_region(e)]
     observation = task.observe(running)
     targets = _merge(predict(observation, running), planner, config.merge_distance)
+    for row, e in enumerate(running):
+        if batch.since_toggle[e] >= config.stall_phases:
+            targets.q_goal[row] = targets.q_toggle[row]
     for e in leaving:
         row = running.index(e)
         targets.q_goal[row] = targets.q_toggle[row] = task.retreat(e)
@@ -287,7 +292,7 @@ def _plan(
     )
 
 
-def _execute(batch: _Batch, phase: Phase) -> set[int]:
+def _execute(batch: _Batch, phase: Phase, tolerance: float) -> set[int]:
     """Moves, and toggles grippers that have arrived; returns the episodes that toggled."""
     task = batch.task
     task.follow(phase.executed, [phase.motion.q[e] for e in phase.executed])
@@ -295,12 +300,13 @@ def _execute(batch: _Batch, phase: Phase) -> set[int]:
     close = {
         e: bool(phase.targets.gripper_toggle[row])
         for row, e in enumerate(phase.episodes)
-        if phase.last[row] and task.arrived(e, phase.targets.q_toggle[row])
+        if phase.last[row] and task.arrived(e, phase.targets.q_toggle[row], tolerance)
     }
     task.toggle(list(close), list(close.values()))
     for e in phase.episodes:
         moved = e in phase.executed and np.ptp(phase.motion.q[e], axis=0).max() > STILL
         batch.stuck[e] = 0 if moved or e in close else batch.stuck[e] + 1
+        batch.since_toggle[e] = 0 if e in close else batch.since_toggle[e] + 1
         batch.touched[e] = e in close or (batch.touched[e] and not moved)
     return set(close)
 
