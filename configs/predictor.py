@@ -2,8 +2,8 @@
 
     python -m jaxplan.train predictor --config configs/predictor.py
 
-About 35 minutes on two quiet cores (250 images/s). Expected: toggle error on held-out
-episodes about 0.03 rad (median, L2 over the joints).
+About 33 minutes on two cores. Toggle error on held-out episodes of 1,536 demonstrations: median
+0.034 rad, mean 0.042 (L2 over the joints); it was still falling, so more steps would help.
 """
 
 from jaxplan.config import (
