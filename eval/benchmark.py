@@ -10,7 +10,6 @@ are spared what the question does not need (friction).
 
 import json
 import os
-import sys
 import time
 from collections import Counter
 from collections.abc import Callable
@@ -22,10 +21,10 @@ import jax
 import jax.numpy as jnp
 import mujoco
 import numpy as np
-import tyro
 from mujoco.batch import Batch
 from tqdm import tqdm
 
+from jaxplan.cli import run_script
 from jaxplan.collision import XLA_OPTIONS, World, clearance, config_free, make_world
 from jaxplan.collision.certify import carry, qpos_rows
 from jaxplan.evaluation import versions
@@ -271,8 +270,4 @@ def show(result: dict) -> None:
 
 
 if __name__ == "__main__":
-    try:
-        main(tyro.cli(Args))
-    except (ValueError, RuntimeError) as error:
-        print(f"error: {error}", file=sys.stderr)
-        sys.exit(2)
+    run_script(main, Args)

@@ -7,13 +7,12 @@ proposals; each path and each executed motion is then judged by C MuJoCo.
 """
 
 import json
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 
-import tyro
 from tqdm import tqdm
 
+from jaxplan.cli import run_script
 from jaxplan.config import DemonstrationConfig, PlannerConfig
 from jaxplan.evaluation import parse_seeds, versions, wilson
 from jaxplan.evaluation.certification import Certification
@@ -75,8 +74,4 @@ def main(args: Args) -> None:
 
 
 if __name__ == "__main__":
-    try:
-        main(tyro.cli(Args))
-    except (ValueError, RuntimeError) as error:
-        print(f"error: {error}", file=sys.stderr)
-        sys.exit(2)
+    run_script(main, Args)

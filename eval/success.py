@@ -1,13 +1,12 @@
 """Success over seeds: `python eval/success.py --seeds 100000:100100 --out success.json`."""
 
 import json
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 
-import tyro
 from tqdm import tqdm
 
+from jaxplan.cli import run_script
 from jaxplan.evaluation import Success, evaluate, parse_seeds
 from jaxplan.learning import load_pair
 from jaxplan.learning.pretrained import DIRECTORY
@@ -55,8 +54,4 @@ def main(args: Args) -> None:
 
 
 if __name__ == "__main__":
-    try:
-        main(tyro.cli(Args))
-    except (ValueError, RuntimeError, OSError) as error:
-        print(f"error: {error}", file=sys.stderr)
-        sys.exit(2)
+    run_script(main, Args)

@@ -2,8 +2,10 @@
 
 import difflib
 import sys
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any, NoReturn
 
 import tyro
 
@@ -34,8 +36,27 @@ def main(arguments: list[str] | None = None) -> int:
     command = tyro.extras.subcommand_cli_from_dict(
         COMMANDS, prog="jaxplan", args=arguments
     )
+    return _guarded(lambda: _solve(command))
+
+
+def run_script(main: Callable[[Any], None], arguments: type) -> NoReturn:
+    """Parses a script's command line into `arguments`, runs `main` on it, and exits.
+
+    The scripts of `train/` and `eval/` end here: 0 when done, 2 and one line for bad input.
+    """
+    options = tyro.cli(arguments)
+
+    def run() -> int:
+        main(options)
+        return 0
+
+    sys.exit(_guarded(run))
+
+
+def _guarded(run: Callable[[], int]) -> int:
+    """The exit code of `run`; bad input is one line and 2."""
     try:
-        return _solve(command)
+        return run()
     except (ValueError, RuntimeError, OSError) as error:
         return _fail((str(error) or type(error).__name__).splitlines()[0])
 

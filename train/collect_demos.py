@@ -7,15 +7,14 @@ again; a finished collection has a manifest with the checksum of each.
 import dataclasses
 import multiprocessing
 import os
-import sys
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass, field
 from pathlib import Path
 
-import tyro
 from tqdm import tqdm
 
 from jaxplan import data
+from jaxplan.cli import run_script
 from jaxplan.config import DemonstrationConfig, PlannerConfig
 
 
@@ -123,8 +122,4 @@ def _collect(args: Args, missing: list[int]) -> None:
 
 
 if __name__ == "__main__":
-    try:
-        main(tyro.cli(Args))
-    except (ValueError, RuntimeError, OSError) as error:
-        print(f"error: {error}", file=sys.stderr)
-        sys.exit(2)
+    run_script(main, Args)

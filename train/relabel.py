@@ -5,15 +5,14 @@ DAgger). Resumes shard by shard, as `collect_demos.py` does.
 """
 
 import dataclasses
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 
-import tyro
 from tqdm import tqdm
 
 from jaxplan import data
 from jaxplan.agent import Agent
+from jaxplan.cli import run_script
 from jaxplan.learning import load_pair
 from jaxplan.learning.pretrained import DIRECTORY
 from jaxplan.motion import MotionPlanner
@@ -70,8 +69,4 @@ def main(args: Args) -> None:
 
 
 if __name__ == "__main__":
-    try:
-        main(tyro.cli(Args))
-    except (ValueError, RuntimeError) as error:
-        print(f"error: {error}", file=sys.stderr)
-        sys.exit(2)
+    run_script(main, Args)

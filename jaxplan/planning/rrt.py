@@ -10,7 +10,7 @@ import jax.numpy as jnp
 
 from jaxplan.config import PlannerConfig
 from jaxplan.planning.proposal import Draw, mixture
-from jaxplan.planning.segment import Proposal, Segment
+from jaxplan.planning.segment import Segment, straightened
 from jaxplan.planning.state import Control, Move, Outcome, Query
 from jaxplan.planning.tree import Tree, distance, nearest
 
@@ -47,16 +47,8 @@ def propose(
     """A proposal of the mixture, or the next straight step to q_goal."""
     del tree
     proposal, learned = mixture(draw, asking, segment, query.q_goal, config)
-    straight = control.connecting
-    return Move(
-        Proposal(
-            target=jnp.where(straight[:, None], query.q_goal, proposal.target),
-            direction=proposal.direction,
-            length=jnp.where(straight, config.step_max, proposal.length),
-            toward=straight | proposal.toward,
-        ),
-        learned,
-    )
+    move = straightened(proposal, control.connecting, query.q_goal, config.step_max)
+    return Move(move, learned)
 
 
 def advance(

@@ -14,7 +14,7 @@ import jax.numpy as jnp
 
 from jaxplan.config import PlannerConfig
 from jaxplan.planning.proposal import Draw, mixture
-from jaxplan.planning.segment import Proposal, Segment
+from jaxplan.planning.segment import Segment, straightened
 from jaxplan.planning.state import Control, Move, Outcome, Query
 from jaxplan.planning.tree import Tree, at, nearest
 
@@ -55,17 +55,9 @@ def propose(
     direction = jnp.where(forward, segment.direction, -segment.direction)
     segment = Segment(direction, segment.length)
     proposal, learned = mixture(draw, asking, segment, towards, config)
-    straight = control.connecting
     q_aim = at(tree.q, control.aim)
-    return Move(
-        Proposal(
-            target=jnp.where(straight[:, None], q_aim, proposal.target),
-            direction=proposal.direction,
-            length=jnp.where(straight, config.step_max, proposal.length),
-            toward=straight | proposal.toward,
-        ),
-        learned,
-    )
+    move = straightened(proposal, control.connecting, q_aim, config.step_max)
+    return Move(move, learned)
 
 
 def advance(

@@ -45,6 +45,18 @@ class Proposal(NamedTuple):
     """`[P]` the move goes to `target` and not along `direction`."""
 
 
+def straightened(
+    proposal: Proposal, connecting: jax.Array, q_aim: jax.Array, step: float
+) -> Proposal:
+    """The proposal, but where `connecting` [P] a straight move of `step` to `q_aim` [P, d]."""
+    return Proposal(
+        target=jnp.where(connecting[:, None], q_aim, proposal.target),
+        direction=proposal.direction,
+        length=jnp.where(connecting, step, proposal.length),
+        toward=connecting | proposal.toward,
+    )
+
+
 def usable(segment: Segment) -> jax.Array:
     """Which segments are a move at all: finite, with a direction other than zero."""
     norm = jnp.linalg.norm(segment.direction, axis=-1)
