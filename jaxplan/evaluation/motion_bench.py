@@ -1,0 +1,210 @@
+"""Planning problems that others are measured on: MotionBenchMaker, a cage, a table.
+
+The robot is the Panda as 59 spheres. It comes as MJCF text, so that MuJoCo's own checker
+and every peer see the geoms that we see.
+
+MotionBenchMaker (Chamzas et al. 2021) is not part of the package: its two files, as the
+VAMP project distributes them, lie in `data_directory()`.
+"""
+
+import json
+import os
+from collections import defaultdict
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+HOME = (0, -0.785, 0, -2.356, 0, 1.571, 0.785)
+"""Where the arm rests [rad]: the start of all of MotionBenchMaker's problems."""
+
+
+class Obstacle(NamedTuple):
+    """A convex body at rest."""
+
+    kind: str
+    """"box", "sphere", "cylinder" or "capsule"."""
+    size: np.ndarray
+    """`[3]` as MuJoCo has it [m]: half extents; or radius, half length; rest 0."""
+    pose: np.ndarray
+    """`[7]` position [m] and quaternion (w, x, y, z)."""
+
+
+class Problem(NamedTuple):
+    """From a start to a goal among obstacles."""
+
+    set: str
+    index: int
+    """Its number in the set."""
+    q_start: np.ndarray
+    """`[7]` [rad]."""
+    q_goal: np.ndarray
+    """`[7]` [rad]."""
+    obstacles: tuple[Obstacle, ...]
+
+
+def data_directory() -> Path:
+    """$JAXPLAN_MOTION_BENCH, by default `../shared/data` as seen from the checkout."""
+    default = "../shared/data/motion_bench_maker"
+    return Path(os.environ.get("JAXPLAN_MOTION_BENCH", default))
+
+
+def read_robot(directory: str | os.PathLike) -> dict:
+    """The Panda's spheres, joints and pairs of links that are never checked.
+
+    Raises:
+        FileNotFoundError: The directory lacks `panda_spheres.json`.
+    """
+    return _read(directory, "panda_spheres.json")
+
+
+def read_problems(directory: str | os.PathLike) -> dict[str, list[Problem]]:
+    """The problems of each set, in its order, with the first of their goals.
+
+    Raises:
+        FileNotFoundError: The directory lacks `panda_problems.json`.
+    """
+    sets = _read(directory, "panda_problems.json")["problems"]
+    return {
+        name: [
+            _problem(name, p["index"], p["start"], p["goals"][0], _obstacles(p))
+            for p in problems
+        ]
+        for name, problems in sets.items()
+    }
+
+
+def panda_mjcf(robot: dict, obstacles: str = "") -> str:
+    """The Panda as MJCF: its links by name, spheres for geoms, key frame `home`.
+
+    Hand and fingers are welded to the last link, as the sphere model has them.
+
+    Args:
+        robot: What `read_robot` gives.
+        obstacles: More XML for the world's body.
+    """
+    joints = defaultdict(list)
+    for joint in robot["joints"]:
+        joints[joint["parent"]].append(joint)
+
+    def body(link: str, placed: str = "", moved: str = "") -> str:
+        spheres = "".join(
+            f'<geom size="{s["radius"]}" pos="{_row(s["position"])}"/>\n'
+            for s in robot["links"][link]
+        )
+        below = "".join(
+            body(
+                j["child"],
+                f' pos="{_row(j["xyz"])}" euler="{_row(j["rpy"])}"',
+                _hinge(j) if j["type"] == "revolute" else "",
+            )
+            for j in joints[link]
+        )
+        return f'<body name="{link}"{placed}>\n{moved}{spheres}{below}</body>\n'
+
+    excluded = "".join(
+        f'<exclude body1="{a}" body2="{b}"/>\n' for a, b in robot["disable_collisions"]
+    )
+    # Capital XYZ: rpy turns about the axes of the parent, which stay where they are.
+    return f"""<mujoco model="panda as spheres">
+<compiler angle="radian" eulerseq="XYZ"/>
+<worldbody>
+{body("panda_link0")}{obstacles}</worldbody>
+<contact>
+{excluded}</contact>
+<keyframe><key name="home" qpos="{_row(HOME)}"/></keyframe>
+</mujoco>
+"""
+
+
+def obstacles_mjcf(obstacles: Iterable[Obstacle]) -> str:
+    """Geoms at rest, for `panda_mjcf`."""
+    return "".join(
+        f'<geom name="{o.kind}{i}" type="{o.kind}" size="{_row(o.size)}" '
+        f'pos="{_row(o.pose[:3])}" quat="{_row(o.pose[3:])}"/>\n'
+        for i, o in enumerate(obstacles)
+    )
+
+
+def sphere_cage() -> Problem:
+    """VAMP's example: out of one gap between 14 spheres and into another."""
+    low = [(0.55, 0), (0.35, 0.35), (0, 0.55), (-0.55, 0), (-0.35, -0.35)]
+    low += [(0, -0.55), (0.35, -0.35)]
+    high = [(0.35, 0.35), (0, 0.55), (-0.35, 0.35), (-0.55, 0), (-0.35, -0.35)]
+    high += [(0, -0.55), (0.35, -0.35)]
+    centres = [(*xy, 0.25) for xy in low] + [(*xy, 0.8) for xy in high]
+    spheres = [_obstacle("sphere", [0.2], centre) for centre in centres]
+    goal = (2.35, 1, 0, -0.8, 0, 2.5, 0.785)
+    return _problem("sphere_cage", 0, HOME, goal, spheres)
+
+
+def table() -> Problem:
+    """From over the mug into the box, with a block in between."""
+    obstacles = [
+        _obstacle("box", [0.3, 0.5, 0.02], [0.6, 0, 0.1]),  # table top
+        _obstacle("box", [0.12, 0.12, 0.005], [0.55, -0.3, 0.125]),  # floor of the box
+        _obstacle("box", [0.005, 0.12, 0.06], [0.425, -0.3, 0.18]),  # and its walls
+        _obstacle("box", [0.005, 0.12, 0.06], [0.675, -0.3, 0.18]),
+        _obstacle("box", [0.13, 0.005, 0.06], [0.55, -0.425, 0.18]),
+        _obstacle("box", [0.13, 0.005, 0.06], [0.55, -0.175, 0.18]),
+        _obstacle("box", [0.05, 0.05, 0.2], [0.55, 0, 0.32]),  # block
+        _obstacle("capsule", [0.04, 0.03], [0.55, 0.3, 0.19]),  # mug
+    ]
+    start = (0.31, 0.28, 0.21, -1.82, -0.07, 2.1, 0.78)
+    goal = (-0.32, 0.38, -0.19, -1.9, 0.09, 2.27, 0.79)
+    return _problem("table", 0, start, goal, obstacles)
+
+
+def _read(directory: str | os.PathLike, name: str) -> dict[str, Any]:
+    file = Path(directory) / name
+    if not file.is_file():
+        raise FileNotFoundError(
+            f"no {name} in {str(directory)!r}: set JAXPLAN_MOTION_BENCH to its directory"
+        )
+    return json.loads(file.read_text(encoding="utf-8"))
+
+
+def _obstacles(problem: dict) -> list[Obstacle]:
+    sizes = {
+        "box": lambda geom: geom["half_extents"],
+        "cylinder": lambda geom: [geom["radius"], geom["length"] / 2],
+        "sphere": lambda geom: [geom["radius"]],
+    }
+    return [
+        _obstacle(kind, size(geom), geom["position"], geom["orientation_quat_xyzw"])
+        for kind, size in sizes.items()
+        for geom in problem[kind]
+    ]
+
+
+def _obstacle(
+    kind: str,
+    size: Iterable[float],
+    position: Iterable[float],
+    xyzw: Iterable[float] = (0, 0, 0, 1),
+) -> Obstacle:
+    x, y, z, w = xyzw
+    three = np.array([*size, 0, 0][:3], float)
+    return Obstacle(kind, three, np.array([*position, w, x, y, z], float))
+
+
+def _problem(
+    name: str,
+    index: int,
+    start: Iterable[float],
+    goal: Iterable[float],
+    obstacles: Iterable[Obstacle],
+) -> Problem:
+    q_start, q_goal = np.array([start, goal], float)
+    return Problem(name, index, q_start, q_goal, tuple(obstacles))
+
+
+def _hinge(joint: dict) -> str:
+    axis, limits = _row(joint["axis"]), _row(joint["limit"])
+    return f'<joint name="{joint["name"]}" axis="{axis}" range="{limits}"/>\n'
+
+
+def _row(numbers: Iterable[float]) -> str:
+    """Numbers as an attribute has them."""
+    return " ".join(map(str, numbers))
