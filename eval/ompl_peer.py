@@ -7,6 +7,7 @@ import multiprocessing
 import time
 from collections.abc import Sequence
 from multiprocessing.synchronize import Barrier
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -33,7 +34,7 @@ class OmplPlanner:
         qpos, joints = data.qpos, model.nq
         self._range, self._checks = range, 0
 
-        def valid(state: base.State) -> bool:
+        def valid(state: Any) -> bool:
             self._checks += 1
             qpos[:] = state[0:joints]
             mujoco.mj_kinematics(model, data)
@@ -52,7 +53,7 @@ class OmplPlanner:
         self._setup.setStateValidityChecker(valid)
         # Draws random numbers the first time, which shall not count among the seed's.
         self._setup.getSpaceInformation().setup()
-        self._ends = space.allocState(), space.allocState()
+        self._ends: tuple[Any, Any] = space.allocState(), space.allocState()
 
     def solve(
         self, q_start: np.ndarray, q_goal: np.ndarray, seed: int, limit: float = 10.0
@@ -83,7 +84,7 @@ class OmplPlanner:
         status = setup.solve(limit)
         seconds = time.perf_counter() - start
         solved = setup.haveExactSolutionPath()
-        states = setup.getSolutionPath().getStates() if solved else []
+        states: list[Any] = setup.getSolutionPath().getStates() if solved else []
         rows = [state[0 : len(q_goal)] for state in states]
         path = np.array(rows).reshape(-1, len(q_goal))
         return Planned(solved, str(status), path, self._checks, seconds)
