@@ -1,0 +1,170 @@
+"""Geoms as the narrow phase sees them: batch last, each coordinate an array of its own.
+
+Geoms of one kind are rows of one array, `[n, B]` for each coordinate. They are read in
+the frames of their bodies, where they are constants, and carried to where they are.
+"""
+
+from collections.abc import Iterable, Sequence
+from functools import reduce
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import mujoco
+import numpy as np
+
+from jaxplan.collision.kinematics import rotation_of
+from jaxplan.scene import Scene
+
+Vector = list[jax.Array]
+"""Three coordinates, each an array of its own."""
+
+
+class Score(NamedTuple):
+    """How a distance is rated."""
+
+    exact: bool
+    """True: signed distance [m]. False: only the sign of distance - margin counts,
+    which spares the square root and what happens inside a box."""
+    margin: jax.Array | float = 0.0
+    """[m], at least 0; subtracted."""
+
+    def of_squared(self, squared: jax.Array, radius: jax.Array | float) -> jax.Array:
+        """Rates a squared distance between cores that are `radius` thick together."""
+        reach = radius + self.margin
+        if self.exact:
+            return jnp.sqrt(squared) - reach
+        return squared - reach * reach
+
+    def of(self, distance: jax.Array, radius: jax.Array | float) -> jax.Array:
+        """Rates a signed distance to a core that is `radius` thick."""
+        return distance - (radius + self.margin)
+
+
+class Shapes(NamedTuple):
+    """Geoms of one kind, in some frame."""
+
+    centre: Vector
+    """Each `[n, B]` [m]; B = 1 in the frame of their own body."""
+    axes: list[Vector]
+    """The geoms' x, y and z in that frame."""
+    size: Vector
+    """MuJoCo's sizes, each `[n, B]` or `[n, 1]` [m]."""
+    vertices: Sequence[jax.Array] = ()
+    """Of meshes: their hulls in the geoms' own frames, each `[V, n, 1]` [m]."""
+
+
+def read(scene: Scene, ids: tuple[int, ...]) -> Shapes:
+    """Geoms in the frames of their bodies."""
+    model, rows = scene.model, np.array(ids)
+    rotation = rotation_of(model.geom_quat[rows].T)[..., None]
+    return Shapes(
+        list(model.geom_pos[rows].T[..., None]),
+        [list(rotation[:, k]) for k in range(3)],
+        list(model.geom_size[rows].T[..., None]),
+        _vertices(scene.mj_model, ids),
+    )
+
+
+def in_world(shapes: Shapes, poses: jax.Array, rows: np.ndarray) -> Shapes:
+    """Geoms in the world.
+
+    Args:
+        shapes: Geoms in the frames of their bodies.
+        poses: `[n_links, 3, 4, B]` poses in the world.
+        rows: `[n]` the link of each geom.
+    """
+    # One gather: XLA vectorises what reads one array, not what reads twelve.
+    pose = poses[rows]
+
+    def turn(vector: Vector) -> Vector:
+        return [total(pose[:, i, k] * vector[k] for k in range(3)) for i in range(3)]
+
+    centre = [x + pose[:, i, 3] for i, x in enumerate(turn(shapes.centre))]
+    return shapes._replace(centre=centre, axes=[turn(axis) for axis in shapes.axes])
+
+
+def seen_from(shapes: Shapes, frame: jax.Array) -> Shapes:
+    """Geoms of the world in the frame `[3, 4, B]`."""
+
+    def turn_back(vector: Vector) -> Vector:
+        return [total(frame[k, i] * vector[k] for k in range(3)) for i in range(3)]
+
+    offset = [shapes.centre[i] - frame[i, 3] for i in range(3)]
+    return shapes._replace(
+        centre=turn_back(offset), axes=[turn_back(axis) for axis in shapes.axes]
+    )
+
+
+def smaller(a: jax.Array, b: jax.Array | float) -> jax.Array:
+    """Minimum in one instruction, where `jnp.minimum` takes three to keep NaN.
+
+    NaN is looked for in what comes in (`queries`).
+    """
+    return jnp.where(a < b, a, b)
+
+
+def larger(a: jax.Array, b: jax.Array | float) -> jax.Array:
+    """Maximum in one instruction, see `smaller`."""
+    return jnp.where(a > b, a, b)
+
+
+def total(terms: Iterable[jax.Array]) -> jax.Array:
+    """Sum."""
+    return reduce(jnp.add, terms)
+
+
+def dot(a: Vector, b: Vector) -> jax.Array:
+    """Scalar product."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def cross(a: Vector, b: Vector) -> Vector:
+    """Vector product."""
+    return [a[i - 2] * b[i - 1] - a[i - 1] * b[i - 2] for i in range(3)]
+
+
+def plus(a: Vector, b: Vector) -> Vector:
+    """a + b."""
+    return [x + y for x, y in zip(a, b, strict=True)]
+
+
+def minus(a: Vector, b: Vector) -> Vector:
+    """a - b."""
+    return [x - y for x, y in zip(a, b, strict=True)]
+
+
+def times(factor: jax.Array, a: Vector) -> Vector:
+    """The vector a, scaled."""
+    return [factor * x for x in a]
+
+
+def where(choose: jax.Array, a: Vector, b: Vector) -> Vector:
+    """The vector a where chosen, else b."""
+    return [jnp.where(choose, x, y) for x, y in zip(a, b, strict=True)]
+
+
+def _vertices(model: mujoco.MjModel, ids: tuple[int, ...]) -> list[jax.Array]:
+    """Hulls of meshes, filled up to one length with their own first vertex."""
+    meshes = [int(model.geom_dataid[g]) for g in ids]
+    if model.geom_type[ids[0]] != mujoco.mjtGeom.mjGEOM_MESH:
+        return []
+    hulls = [_hull(model, mesh) for mesh in meshes]
+    longest = max(map(len, hulls))
+    rows = [np.concatenate([h, h[:1].repeat(longest - len(h), 0)]) for h in hulls]
+    return list(jnp.asarray(np.transpose(rows)[..., None], jnp.float32))
+
+
+def _hull(model: mujoco.MjModel, mesh: int) -> np.ndarray:
+    """`[V, 3]` vertices of a mesh's convex hull; all of its vertices if MuJoCo made none.
+
+    The graph is: numbers of vertices and of faces, an edge address per vertex, then each
+    vertex' place in the mesh.
+    """
+    start, count = model.mesh_vertadr[mesh], model.mesh_vertnum[mesh]
+    vertices = model.mesh_vert[start : start + count]
+    graph = model.mesh_graphadr[mesh]
+    if graph < 0:
+        return vertices
+    count = model.mesh_graph[graph]
+    return vertices[model.mesh_graph[graph + 2 + count : graph + 2 + 2 * count]]
