@@ -6,6 +6,7 @@ Every seed counts. The problems that the episodes pose (about 14 each) are plann
 proposals; each path and each executed motion is then judged by C MuJoCo.
 """
 
+import dataclasses
 import json
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,7 +14,7 @@ from pathlib import Path
 from tqdm import tqdm
 
 from jaxplan.cli import run_script
-from jaxplan.config import DemonstrationConfig, PlannerConfig
+from jaxplan.config import PAPER_PLANNER, DemonstrationConfig, PlannerConfig
 from jaxplan.evaluation import parse_seeds, versions, wilson
 from jaxplan.evaluation.certification import Certification
 from jaxplan.evaluation.success import episode_json
@@ -31,7 +32,7 @@ class Args:
     seeds: str = "0:200"
     out: Path = Path("runs/expert.json")
     batch: int = 32
-    planner: PlannerConfig = PlannerConfig(p_uniform=1.0)
+    planner: PlannerConfig = dataclasses.replace(PAPER_PLANNER, p_uniform=1.0)
 
 
 def main(args: Args) -> None:

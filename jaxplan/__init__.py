@@ -1,3 +1,14 @@
 """Motion planning in JAX for MuJoCo models, guided by learned samplers."""
 
+from jaxplan.collision import Obstacle as Obstacle
+from jaxplan.collision import World as World
+from jaxplan.collision import make_world as make_world
+from jaxplan.config import PlannerConfig as PlannerConfig
+from jaxplan.config import TrajectoryConfig as TrajectoryConfig
+from jaxplan.planner import Plan as Plan
+from jaxplan.planner import Planner as Planner
+from jaxplan.planning import Segment as Segment
+from jaxplan.planning import Status as Status
+from jaxplan.scene import Scene as Scene
+
 __version__ = "0.1.0"

@@ -1,4 +1,5 @@
-"""Every setting, as frozen dataclasses. Defaults are the paper's numbers where it gives them.
+"""Every setting, as frozen dataclasses. Defaults are the paper's numbers where it gives them;
+`PlannerConfig` alone has defaults of its own, and the paper's in `PAPER_PLANNER`.
 
 A file in `configs/` holds differences from these defaults and nothing else.
 """
@@ -11,20 +12,24 @@ from typing import Any, Literal
 
 @dataclass(frozen=True)
 class PlannerConfig:
-    """RRT and RRT-Connect (Algorithm 1). Switches apply to every sampler alike."""
+    """RRT and RRT-Connect (Algorithm 1). Switches apply to every sampler alike.
+
+    The defaults are for planning as such; `PAPER_PLANNER` has the paper's numbers.
+    """
 
     method: Literal["rrt", "rrt_connect"] = "rrt_connect"
-    max_expansions: int = 500
+    max_expansions: int = 20_000
     """N_rrt: proposals whose motion is checked, each connect step included."""
     p_uniform: float = 0.2
-    """Probability that a proposal is a uniform segment and not a learned one."""
+    """Probability that a proposal is a uniform segment and not a learned one, if there is a
+    sampler."""
     uniform_mode: Literal["toward", "independent"] = "toward"
     """`toward`: the uniform move goes from the nearest node toward q_rand (classical RRT).
     `independent`: its direction is drawn apart from q_rand, as the paper's UniformSegment."""
     goal_bias: float = 0.05
     """Probability that a uniform proposal goes straight toward q_goal."""
-    step_min: float = 0.05
-    step_max: float = 0.2
+    step_min: float = 1.0
+    step_max: float = 1.0
     """Step length of every sampler, s in [step_min, step_max] [rad]."""
     goal_tolerance: float = 0.05
     """A node reaches q_goal within this distance [rad]."""
@@ -37,15 +42,31 @@ class PlannerConfig:
     one nearer to q_toggle is the base of a learned proposal (section 4.3); 0 = off."""
     metric: tuple[float, ...] | None = None
     """Diagonal of W in d(q, q') = |W (q - q')|; None = identity."""
-    proposals: int = 16
-    """Most proposals of a problem in one collision call. Any value gives the tree that 1 gives."""
+    workers: int = 16
+    """K: expansions of a problem in one round, which do not know of each other. 1 is the textbook
+    algorithm; more find a way sooner."""
+    lanes: int = 32
+    """Problems of a batch that are searched side by side; the others wait for a free lane."""
     check_rows: int = 256
-    """Motions of one collision call, or one for each problem where that is more. While many
-    problems search, each puts in fewer proposals. More pays on a GPU; the trees are the same."""
-    margin: float = 0.004
-    """Clearance that a configuration needs to count as free [m]; covers tracking errors."""
-    edge_resolution: float = 0.025
+    """Configurations of one collision call, about. More pays on a GPU; the trees are the same."""
+    margin: float = 0.002
+    """Clearance that a configuration needs to count as free [m]."""
+    edge_resolution: float = 1 / 32
     """Longest gap between checked configurations of a motion [rad]."""
+    path_resolution: float = 0.01
+    """The same on the path that is found, checked once more as a whole; 0 = off."""
+
+
+PAPER_PLANNER = PlannerConfig(
+    max_expansions=500,
+    step_min=0.05,
+    step_max=0.2,
+    workers=1,
+    margin=0.004,  # covers tracking errors
+    edge_resolution=0.025,
+    path_resolution=0.0,  # what is executed is validated after smoothing
+)
+"""Section 5.1, and one proposal at a time."""
 
 
 @dataclass(frozen=True)

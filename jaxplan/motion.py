@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from jaxplan import collision
 from jaxplan.collision import World
-from jaxplan.config import PlannerConfig, TrajectoryConfig
+from jaxplan.config import PAPER_PLANNER, PlannerConfig, TrajectoryConfig
 from jaxplan.planning import PlanResult, Segment, make_planner
 from jaxplan.scene import Scene
 from jaxplan.scene.panda import JointLimits
@@ -53,24 +53,19 @@ class MotionPlanner:
         self,
         scene: Scene,
         limits: JointLimits,
-        planner: PlannerConfig = PlannerConfig(),
+        planner: PlannerConfig = PAPER_PLANNER,
         trajectory: TrajectoryConfig = TrajectoryConfig(),
     ) -> None:
         self.scene, self.limits = scene, limits
         self._trajectory = trajectory
-        points = collision.points_for(planner.step_max, planner.edge_resolution)
 
         def config_free(worlds, problem, q):
             world = _rows(worlds, problem)
             return collision.config_free(scene, world, q, planner.margin)
 
-        def motion_free(worlds, problem, q0, q1):
-            world = _rows(worlds, problem)
-            return collision.motion_free(scene, world, q0, q1, points, planner.margin)
-
         self._config_free = jit(config_free)
         self._search = make_planner(
-            motion_free, config_free, planner, limits.q_min, limits.q_max, jit
+            config_free, planner, limits.q_min, limits.q_max, jit
         )
         self._offsets = _neighbours(len(limits.q_min))
 

@@ -27,11 +27,13 @@ def mug_task():
 @pytest.fixture(scope="session")
 def mug_planner(mug_task):
     """A planner for four problems at a time, compiled once for all tests."""
-    from jaxplan.config import PlannerConfig
+    from dataclasses import replace
+
+    from jaxplan.config import PAPER_PLANNER
     from jaxplan.motion import MotionPlanner
     from jaxplan.scene.panda import PANDA_LIMITS
 
-    planner = PlannerConfig(p_uniform=1.0)
+    planner = replace(PAPER_PLANNER, p_uniform=1.0)
     return MotionPlanner(mug_task.planning_scene, PANDA_LIMITS, planner)
 
 

@@ -15,7 +15,7 @@ from tqdm import tqdm
 
 from jaxplan import data
 from jaxplan.cli import run_script
-from jaxplan.config import DemonstrationConfig, PlannerConfig
+from jaxplan.config import PAPER_PLANNER, DemonstrationConfig
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ class Collector:
 
         self._args = args
         self._task = MugTask(args.shard_size, args.camera)
-        planner = PlannerConfig(p_uniform=1.0)
+        planner = dataclasses.replace(PAPER_PLANNER, p_uniform=1.0)
         self._planner = MotionPlanner(self._task.planning_scene, PANDA_LIMITS, planner)
         self._policy = ExpertPolicy(self._task, args.demonstration)
 

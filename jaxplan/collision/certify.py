@@ -9,8 +9,9 @@ import mujoco
 import numpy as np
 import numpy.typing as npt
 
-from jaxplan.collision.world import World, batch_shape, object_address
+from jaxplan.collision.world import OWN_AXES, World, batch_shape, object_address
 from jaxplan.scene import Scene
+from jaxplan.scene.contacts import KINDS
 
 
 class Certificate(NamedTuple):
@@ -100,21 +101,41 @@ def mujoco_model(scene: Scene, reach: float = 0.0) -> mujoco.MjModel:
     for field in fields.split():
         getattr(model, field)[:] = np.asarray(getattr(scene.model, field))
     model.geom_sameframe[:] = mujoco.mjtSameFrame.mjSAMEFRAME_NONE
-    # Bounds of the broad phase follow from the sizes; the tree of bounds in a body does
-    # not follow at all, so it is left out.
-    half = model.geom_size.copy()
-    sphere = model.geom_type == mujoco.mjtGeom.mjGEOM_SPHERE
-    capsule = model.geom_type == mujoco.mjtGeom.mjGEOM_CAPSULE
-    half[sphere] = half[sphere, :1]
-    half[capsule] = half[capsule][:, [0, 0, 0]] + half[capsule][:, [1]] * [0, 0, 1]
-    known = sphere | capsule | (model.geom_type == mujoco.mjtGeom.mjGEOM_BOX)
-    model.geom_aabb[known] = np.concatenate([0 * half, half], -1)[known]
-    bound = np.where(capsule, half[:, 2], np.linalg.norm(half, axis=-1))
-    model.geom_rbound[known] = np.where(sphere, half[:, 0], bound)[known]
+    _bound(model)
     model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_MIDPHASE
     model.geom_margin[:] = reach
     model.body_margin[:] = reach
     return model
+
+
+def fill_slots(
+    scene: Scene, model: mujoco.MjModel, pose: np.ndarray, size: np.ndarray
+) -> None:
+    """Puts obstacles `pose [n_slots, 7]`, `size [n_slots, 3]` into the model's slots."""
+    geoms = [slot.geom for slot in scene.slots]
+    model.geom_pos[geoms], model.geom_size[geoms] = pose[:, :3], size
+    norm = np.linalg.norm(pose[:, 3:], axis=-1, keepdims=True)
+    model.geom_quat[geoms] = pose[:, 3:] / norm
+    _bound(model)
+
+
+def _bound(model: mujoco.MjModel) -> None:
+    """Bounds of the broad phase, anew from the sizes.
+
+    The tree of bounds in a body does not follow at all, so it is left out.
+    """
+    kind = {name: model.geom_type == code for code, name in KINDS.items()}
+    half = model.geom_size.copy()
+    half[kind["sphere"]] = half[kind["sphere"], :1]
+    round_ = kind["capsule"] | kind["cylinder"]
+    caps = np.where(kind["capsule"], half[:, 0], 0)[round_]
+    half[round_, 2], half[round_, 1] = half[round_, 1] + caps, half[round_, 0]
+    known = sum(kind[k] for k in ("sphere", "box", "ellipsoid")).astype(bool) | round_
+    model.geom_aabb[known] = np.concatenate([0 * half, half], -1)[known]
+    bound = np.linalg.norm(half, axis=-1)
+    bound = np.where(kind["capsule"], half[:, 2], bound)
+    bound = np.where(kind["sphere"] | kind["ellipsoid"], half.max(-1), bound)
+    model.geom_rbound[known] = bound[known]
 
 
 def qpos_rows(scene: Scene, worlds: World, q: np.ndarray) -> np.ndarray:
@@ -173,7 +194,10 @@ def _nearest(
         if group.held:
             silent[:, index] |= ~worlds.held[:, list(group.held)].any(-1)
     qpos = qpos_rows(scene, worlds, rows)
+    slots = worlds.slot_pose, worlds.slot_size
     for i in range(len(rows)):
+        if scene.slots and (i == 0 or any((x[i] != x[i - 1]).any() for x in slots)):
+            fill_slots(scene, model, *(x[i] for x in slots))
         data.qpos[:] = qpos[i]
         mujoco.mj_kinematics(model, data)
         if worlds.held[i].any():
@@ -206,7 +230,7 @@ def _rows(world: World, shape: tuple[int, ...]) -> World:
         rows = np.broadcast_to(np.asarray(leaf), (*shape, *tail))
         return rows.reshape(math.prod(shape), *tail)
 
-    return World(*(one(*pair) for pair in zip(world, (2, 1, 1, 1), strict=True)))
+    return World(*(one(*pair) for pair in zip(world, OWN_AXES, strict=True)))
 
 
 def _densify(path: np.ndarray, resolution: float) -> tuple[np.ndarray, np.ndarray]:

@@ -13,8 +13,16 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxplan.collision.kinematics import link_poses
-from jaxplan.collision.narrow import FUNCTIONS, Score, read, relative, smaller
+from jaxplan.collision.kinematics import link_poses, rotation_of
+from jaxplan.collision.narrow import FUNCTIONS
+from jaxplan.collision.shapes import (
+    Score,
+    Shapes,
+    in_world,
+    read,
+    seen_from,
+    smaller,
+)
 from jaxplan.collision.world import World
 from jaxplan.scene import Geoms, Scene
 
@@ -57,24 +65,66 @@ def least_scores(scene: Scene, world: World, q: jax.Array, score: Score) -> jax.
         `[N]`.
     """
     fronts = _fronts(scene)
-    link_of = scene.structure.link_of
-    facing = [read(scene, front.facing) for front in fronts]
-    obstacles = [[read(scene, o.ids) for o in front.obstacles] for front in fronts]
+    slots = {slot.geom: index for index, slot in enumerate(scene.slots)}
+
+    def shapes(ids: tuple[int, ...], world: World) -> Shapes:
+        if ids[0] in slots:
+            return _in_slots(world, [slots[geom] for geom in ids])
+        return read(scene, ids)
+
+    def scores(front: Front, poses: jax.Array, world: World) -> jax.Array:
+        own = in_world(shapes(front.facing, world), poses, np.array(front.links))
+        function = FUNCTIONS[front.kinds]
+        if front.obstacles[0].ids[0] in slots:
+            (obstacles,) = front.obstacles
+            rows = [slots[geom] for geom in obstacles.ids]
+            return _least_over_slots(function, own, world, rows, score)
+        frame = poses[scene.structure.link_of[front.obstacles[0].body]]
+        near = seen_from(own, frame)
+        rated = [function(near, shapes(o.ids, world), score) for o in front.obstacles]
+        return reduce(smaller, rated)
 
     def block(q: jax.Array, world: World) -> jax.Array:
         poses = link_poses(scene, world, q)
         counts = _counts(scene, world)
         least = []
-        for front, own, against in zip(fronts, facing, obstacles, strict=True):
-            frame = poses[link_of[front.obstacles[0].body]]
-            near = relative(own, poses, np.array(front.links), frame)
-            function = FUNCTIONS[front.kinds]
-            scores = reduce(smaller, [function(near, b, score) for b in against])
-            scores = jnp.where(counts[np.array(front.groups)], scores, jnp.inf)
-            least.append(jnp.min(scores, 0))
+        for front in fronts:
+            rated = scores(front, poses, world)
+            rated = jnp.where(counts[np.array(front.groups)], rated, jnp.inf)
+            least.append(jnp.min(rated, 0))
         return reduce(smaller, least)
 
     return _in_blocks(block, q, world)
+
+
+def _in_slots(world: World, rows: list[int]) -> Shapes:
+    """The obstacles in some slots, in the world's frame; leaves `[n, B]`."""
+    pose, size = world.slot_pose[np.array(rows)], world.slot_size[np.array(rows)]
+    turn = rotation_of(jnp.moveaxis(pose[:, 3:], 1, 0))
+    return Shapes(
+        [pose[:, k] for k in range(3)],
+        [[turn[i, k] for i in range(3)] for k in range(3)],
+        [size[:, k] for k in range(3)],
+    )
+
+
+def _least_over_slots(
+    function: Callable, own: Shapes, world: World, rows: list[int], score: Score
+) -> jax.Array:
+    """Least score `[n, B]` over slots of one kind, each seen from its own frame."""
+    still = jnp.zeros((1, 1))
+    axes = [[still + (i == k) for i in range(3)] for k in range(3)]
+    rated = []
+    # Written out: in a loop, XLA on CPU takes three times as long.
+    for row in rows:
+        pose, size = world.slot_pose[row], world.slot_size[row]
+        if pose.shape[-1] == 1:  # numbers are faster than rows of one
+            pose, size = pose[:, 0], size[:, 0]
+        frame = jnp.concatenate([rotation_of(pose[3:]), pose[:3, None]], 1)
+        near = seen_from(own, frame)
+        size = [jnp.atleast_2d(size[k]) for k in range(3)]
+        rated.append(function(near, Shapes([still] * 3, axes, size), score))
+    return reduce(smaller, rated)
 
 
 def _fronts(scene: Scene) -> list[Front]:

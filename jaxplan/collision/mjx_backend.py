@@ -26,16 +26,19 @@ def least_distances(scene: Scene, world: World, q: jax.Array) -> jax.Array:
     Returns:
         `[N]` [m].
     """
+    if scene.slots:
+        raise ValueError("backend 'mjx' has no slots; use 'fast'")
+    model = mjx.put_model(scene.mj_model).replace(**scene.model._asdict())
     empty = mjx.make_data(scene.mj_model)
     groups = jnp.asarray(scene.group_table())
 
     def one(q: jax.Array, world: World) -> jax.Array:
-        data = mjx.kinematics(scene.model, empty.replace(qpos=_qpos(scene, world, q)))
+        data = mjx.kinematics(model, empty.replace(qpos=_qpos(scene, world, q)))
         hand = int(scene.mj_model.body(scene.hand).id)
         held = _held_poses(world, data.xpos[hand], data.xquat[hand])
         moved = world._replace(object_pose=held)
         data = data.replace(qpos=_qpos(scene, moved, q))
-        data = mjx.collision(scene.model, mjx.kinematics(scene.model, data))
+        data = mjx.collision(model, mjx.kinematics(model, data))
         contact = data._impl.contact
         counts = [
             ~world.ignored[i] & (world.held[np.array(g.held, int)].any() | (not g.held))

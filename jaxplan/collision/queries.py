@@ -9,7 +9,7 @@ import jax.numpy as jnp
 from jaxplan.collision.engine import least_scores, missing_kinds
 from jaxplan.collision.mjx_backend import least_distances
 from jaxplan.collision.narrow import Score
-from jaxplan.collision.world import World, batch_shape
+from jaxplan.collision.world import OWN_AXES, World, batch_shape
 from jaxplan.scene import Scene
 
 Backend = Literal["fast", "mjx"]
@@ -88,8 +88,8 @@ def motion_free(
     share = (jnp.arange(points) + 1) / points
     q0, q1 = q0[..., None, :], q1[..., None, :]
     q = q0 + share[:, None] * (q1 - q0)
-    along = World(*(jnp.expand_dims(w, -2) for w in world))
-    along = along._replace(object_pose=jnp.expand_dims(world.object_pose, -3))
+    leaves = zip(world, OWN_AXES, strict=True)
+    along = World(*(jnp.expand_dims(leaf, -1 - own) for leaf, own in leaves))
     return jnp.all(config_free(scene, along, q, margin, backend), -1)
 
 
@@ -104,15 +104,13 @@ def _flat(
     """Flattens the batch, moves it to the last axis, and asks the backend."""
     shape = batch_shape(world, q)
     finite = jnp.isfinite(q).all(-1)
-    finite &= jnp.isfinite(world.object_pose).all((-2, -1))
-    finite &= (world.object_pose[..., 3:] != 0).any(-1).all(-1)  # a rotation
+    for pose in (world.object_pose, world.slot_pose):
+        finite &= jnp.isfinite(pose).all((-2, -1))
+        finite &= (pose[..., 3:] != 0).any(-1).all(-1)  # a rotation
     finite &= jnp.isfinite(world.passive).all(-1)
-    flat = World(
-        _batch_last(world.object_pose, shape, 2),
-        _batch_last(world.held, shape, 1),
-        _batch_last(world.passive, shape, 1),
-        _batch_last(world.ignored, shape, 1),
-    )
+    finite &= jnp.isfinite(world.slot_size).all((-2, -1))
+    leaves = zip(world, OWN_AXES, strict=True)
+    flat = World(*(_batch_last(leaf, shape, own) for leaf, own in leaves))
     rows = _batch_last(jnp.broadcast_to(q, (*shape, q.shape[-1])), shape, 1)
     if backend == "fast":
         if lacking := missing_kinds(scene):

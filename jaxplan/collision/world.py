@@ -1,6 +1,6 @@
 """What changes between queries: where things are, what is held, what may touch."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import jax
@@ -9,6 +9,21 @@ import numpy as np
 import numpy.typing as npt
 
 from jaxplan.scene import Scene
+
+
+FAR = (0.0, 0.0, 1000.0, 1.0, 0.0, 0.0, 0.0)
+"""Where an empty slot is: out of reach of everything."""
+
+
+class Obstacle(NamedTuple):
+    """Something that fills a slot."""
+
+    kind: str
+    """sphere, capsule, cylinder, ellipsoid or box."""
+    size: Sequence[float]
+    """As MuJoCo's: radius; radius and half length; half sides or semi-axes [m]."""
+    pose: Sequence[float]
+    """`[7]` position [m] and quaternion (w, x, y, z); a position alone is enough."""
 
 
 class World(NamedTuple):
@@ -26,6 +41,14 @@ class World(NamedTuple):
     """`[..., n_passive]` positions of the joints that are not the arm's (fingers) [m]."""
     ignored: jax.Array
     """`[..., n_groups]` bool: contacts that this phase allows (`Scene.ignored`)."""
+    slot_pose: jax.Array
+    """`[..., n_slots, 7]` of the obstacles in the scene's slots."""
+    slot_size: jax.Array
+    """`[..., n_slots, 3]` their sizes as MuJoCo's [m]."""
+
+
+OWN_AXES = World(2, 1, 1, 1, 2, 2)  # type: ignore[arg-type]
+"""How many of each leaf's axes are not batch axes."""
 
 
 def make_world(
@@ -34,6 +57,7 @@ def make_world(
     held: npt.ArrayLike | None = None,
     passive: npt.ArrayLike | None = None,
     ignored: Iterable[str] = (),
+    obstacles: Iterable[Obstacle] = (),
 ) -> World:
     """A world; what is not given is as in the model's reference pose.
 
@@ -43,6 +67,10 @@ def make_world(
         held: `[..., n_objects]` bool; none by default.
         passive: `[..., n_passive]` [m].
         ignored: Names of contact groups, such as "hand|mug".
+        obstacles: What fills the scene's slots, at most as many of a kind as there are.
+
+    Raises:
+        ValueError: There is no slot of that kind left, or no such contact group.
     """
     reference = scene.mj_model.qpos0
     start = [object_address(scene, name) for name in scene.objects]
@@ -59,18 +87,39 @@ def make_world(
         jnp.asarray(held, bool),
         jnp.asarray(passive, jnp.float32),
         jnp.asarray(scene.ignored(ignored)),
+        *_fill(scene, obstacles),
     )
+
+
+def _fill(
+    scene: Scene, obstacles: Iterable[Obstacle]
+) -> tuple[jax.Array, jax.Array]:
+    """`slot_pose` and `slot_size` with each obstacle in the first free slot of its kind."""
+    pose = np.tile(np.array(FAR, np.float32), (len(scene.slots), 1))
+    size = np.full((len(scene.slots), 3), 0.01, np.float32)
+    free: dict[str, list[int]] = {}
+    for index, slot in enumerate(scene.slots):
+        free.setdefault(slot.kind, []).append(index)
+    for obstacle in obstacles:
+        if not free.get(obstacle.kind):
+            raise ValueError(
+                f"no slot is left for a {obstacle.kind}: the scene has "
+                f"{sum(slot.kind == obstacle.kind for slot in scene.slots)} "
+                "(see `slots` of Scene.from_mjcf)"
+            )
+        index = free[obstacle.kind].pop(0)
+        pose[index, : len(obstacle.pose)] = obstacle.pose
+        size[index, : len(obstacle.size)] = obstacle.size
+        if len(obstacle.pose) == 3:
+            pose[index, 3:] = FAR[3:]
+    return jnp.asarray(pose), jnp.asarray(size)
 
 
 def batch_shape(world: World, q: jax.Array | np.ndarray) -> tuple[int, ...]:
     """Common leading shape of the world's leaves and of q `[..., d]`."""
-    return jnp.broadcast_shapes(
-        q.shape[:-1],
-        world.object_pose.shape[:-2],
-        world.held.shape[:-1],
-        world.passive.shape[:-1],
-        world.ignored.shape[:-1],
-    )
+    leaves = zip(world, OWN_AXES, strict=True)
+    shapes = [leaf.shape[: leaf.ndim - own] for leaf, own in leaves]
+    return jnp.broadcast_shapes(q.shape[:-1], *shapes)
 
 
 def object_address(scene: Scene, name: str) -> int:

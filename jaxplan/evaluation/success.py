@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from jaxplan.agent import Agent
-from jaxplan.config import PlannerConfig, RolloutConfig, TrajectoryConfig
+from jaxplan.config import PAPER_PLANNER, PlannerConfig, RolloutConfig, TrajectoryConfig
 from jaxplan.evaluation.provenance import versions
 from jaxplan.evaluation.statistics import wilson
 from jaxplan.evaluation.toggle_error import ToggleErrors
@@ -22,7 +22,7 @@ from jaxplan.tasks.mug.task import MugTask
 class Success:
     """Settings of a success study."""
 
-    planner: PlannerConfig = PlannerConfig()
+    planner: PlannerConfig = PAPER_PLANNER
     trajectory: TrajectoryConfig = TrajectoryConfig()
     rollout: RolloutConfig = RolloutConfig()
     camera: str = "hand"

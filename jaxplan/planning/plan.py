@@ -1,9 +1,9 @@
 """The door to planning: checks what it is given, runs the search, refills the bank.
 
-    plan = make_planner(motion_free, config_free, config, q_min, q_max)
+    plan = make_planner(config_free, config, q_min, q_max)
     result = plan(worlds, q_start, q_goal, q_toggle, keys, draw)
 
-Every piece compiles once for a batch size P and a bank size M. `worlds` is an argument of the
+Everything compiles once for a batch size P and a bank size M. `worlds` is an argument of the
 compiled pieces, so a world may change from call to call; a batch that is short of problems is
 padded and `active` says which lanes are real.
 """
@@ -17,16 +17,15 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxplan.config import PlannerConfig
-from jaxplan.planning import search
-from jaxplan.planning.result import PlanResult
+from jaxplan.planning import lanes, search
+from jaxplan.planning.result import PlanResult, Status
 from jaxplan.planning.segment import Segment
-from jaxplan.planning.state import Query, State, searching
+from jaxplan.planning.state import Query
 
 Worlds = Any
 
 
 def make_planner(
-    motion_free: Callable[[Worlds, jax.Array, jax.Array, jax.Array], jax.Array],
     config_free: Callable[[Worlds, jax.Array, jax.Array], jax.Array],
     config: PlannerConfig,
     q_min,
@@ -36,9 +35,8 @@ def make_planner(
     """Builds a planner for batches of problems.
 
     Args:
-        motion_free: `(worlds, problem [R], q0 [R, d], q1 [R, d]) -> [R]`: whether straight
-            motions are free, row r in the world of problem `problem[r]`.
-        config_free: `(worlds, problem [R], q [R, d]) -> [R]`.
+        config_free: `(worlds, problem [R], q [R, d]) -> [R]`: whether configurations are
+            free, row r in the world of problem `problem[r]`.
         config: Planner settings.
         q_min: `[d]` lower joint limits [rad].
         q_max: `[d]` upper joint limits [rad].
@@ -57,27 +55,36 @@ def make_planner(
     _check_settings(config, q_min, q_max)
     d = q_min.size
 
-    @jit
-    def start(worlds: Worlds, query: Query, active: jax.Array) -> State:
+    def run(
+        worlds: Worlds,
+        state: lanes.Lanes,
+        query: Query,
+        status: jax.Array,
+        bank: Segment | None,
+    ) -> lanes.Lanes:
         def free(problem, q):
             return config_free(worlds, problem, q)
 
-        return search.start(query, active, free, _limits(), config)
+        return lanes.run(state, query, status, bank, free, _limits(), config)
+
+    def begin(query: Query, active: jax.Array, count: int):
+        query, status = search.examine(query, _limits())
+        status = jnp.where(active, status, Status.INACTIVE).astype(jnp.int32)
+        return lanes.begin(query, status, count, config), query, status
 
     @jit
-    def grow(worlds: Worlds, state: State, bank: Segment | None) -> State:
-        def free(problem, q0, q1):
-            return motion_free(worlds, problem, q0, q1)
-
-        return search.grow(state, bank, free, _limits(), config)
-
-    @jit
-    def finish(state: State) -> PlanResult:
-        return search.finish(state, config)
+    def uniform(worlds: Worlds, query: Query, active: jax.Array) -> PlanResult:
+        """The whole search in one program."""
+        count = min(len(active), config.lanes)
+        state, query, status = begin(query, active, count)
+        return run(worlds, state, query, status, None).answers
 
     @jit
-    def unfinished(state: State) -> jax.Array:
-        return jnp.any(searching(state, config))
+    def start(query: Query, active: jax.Array):
+        # A lane for each problem: the sampler's banks are by problem.
+        return begin(query, active, len(active))
+
+    guided = jit(run)
 
     def _limits():
         return jnp.asarray(q_min), jnp.asarray(q_max)
@@ -91,28 +98,30 @@ def make_planner(
             _batch(q_toggle, d, "q_toggle"),
             keys,
         )
-        problems = query.q_start.shape[0]
+        problems = len(query.q_start)
         if {len(q) for q in query} != {problems}:
             sizes = [len(q) for q in query]
             raise ValueError(f"q_start, q_goal, q_toggle, keys have lengths {sizes}")
-        active = (
-            jnp.ones(problems, bool) if active is None else jnp.asarray(active, bool)
-        )
-        state = start(worlds, query, active)
+        active = np.ones(problems, bool) if active is None else np.asarray(active, bool)
         if draw is None or config.p_uniform >= 1:
-            return finish(grow(worlds, state, None))
-        chunk = jnp.zeros(problems, jnp.int32)
-        while unfinished(state):
-            bank = draw(chunk)
-            state = grow(worlds, state, bank)
-            chunk = state.control.used // bank.length.shape[1]
-        return finish(state)
+            return uniform(worlds, query, active)
+        state, query, status = start(query, active)
+        waiting = np.ones(problems, bool)
+        while waiting.any():
+            bank = draw(state.state.chunk)
+            if bank.length.shape[1] < config.workers:
+                raise ValueError(
+                    f"a bank of {bank.length.shape[1]} segments for {config.workers} workers"
+                )
+            state = guided(worlds, state, query, status, bank)
+            waiting = np.asarray(state.state.waiting)
+        return state.answers
 
     return plan
 
 
-def _batch(q, d: int, name: str) -> jax.Array:
-    q = jnp.asarray(q, jnp.float32)
+def _batch(q, d: int, name: str) -> np.ndarray:
+    q = np.asarray(q, np.float32)
     if q.ndim != 2 or q.shape[1] != d:
         raise ValueError(f"{name} has shape {q.shape}, expected (problems, {d})")
     return q
@@ -136,13 +145,13 @@ def _check_settings(
         raise ValueError(f"uniform_mode {config.uniform_mode!r}: toward or independent")
     if config.goal_tree not in ("mirrored", "uniform"):
         raise ValueError(f"goal_tree {config.goal_tree!r}: mirrored or uniform")
-    for name in ("max_expansions", "proposals", "check_rows"):
+    for name in ("max_expansions", "workers", "lanes", "check_rows"):
         if getattr(config, name) < 1:
             raise ValueError(f"{name} {getattr(config, name)}, expected at least 1")
     for name in ("p_uniform", "goal_bias"):
         if not 0 <= getattr(config, name) <= 1:
             raise ValueError(f"{name} {getattr(config, name)}, expected 0 to 1")
-    for name in ("goal_tolerance", "goal_connect", "toggle_tie_break"):
+    for name in ("goal_tolerance", "goal_connect", "toggle_tie_break", "path_resolution"):
         if not 0 <= getattr(config, name) < math.inf:
             raise ValueError(f"{name} {getattr(config, name)}, expected 0 or more")
     if not 0 < config.step_min <= config.step_max < math.inf:

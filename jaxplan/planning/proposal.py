@@ -15,14 +15,14 @@ from jaxplan.planning.segment import Limits, Proposal, Segment, usable
 
 
 class Draw(NamedTuple):
-    """The random numbers of one expansion of P problems."""
+    """The random numbers of one expansion of each of K workers of P problems."""
 
     learned: jax.Array
-    """`[P]` use_learned: ask the sampler."""
+    """`[P, K]` use_learned: ask the sampler."""
     goal: jax.Array
-    """`[P]` a uniform proposal goes straight toward the goal instead."""
+    """`[P, K]` a uniform proposal goes straight toward the goal instead."""
     q_rand: jax.Array
-    """`[P, d]` uniform within the limits [rad]."""
+    """`[P, K, d]` uniform within the limits [rad]."""
     segment: Segment
     """UniformSegment: direction uniform on the sphere, length in [step_min, step_max]."""
 
@@ -33,21 +33,21 @@ def draw_numbers(
     limits: Limits,
     config: PlannerConfig,
 ) -> Draw:
-    """The random numbers of expansions `[P]` of the problems with keys `[P]`."""
+    """The random numbers of expansions `[P, K]` of the problems with keys `[P]`."""
     q_min, q_max = limits
     d = q_min.size
 
     def one(key, k):
         return jax.random.bits(jax.random.fold_in(key, k), (3 + 2 * d,))
 
-    bits = jax.vmap(one)(keys, expansion)
+    bits = jax.vmap(jax.vmap(one, (None, 0)))(keys, expansion)
     uniform = (bits >> 9).astype(jnp.float32) * 2.0**-23 + 2.0**-24  # inside (0, 1)
-    normal = jax.scipy.special.ndtri(uniform[:, 3 + d :])
-    length = config.step_min + uniform[:, 2] * (config.step_max - config.step_min)
+    normal = jax.scipy.special.ndtri(uniform[..., 3 + d :])
+    length = config.step_min + uniform[..., 2] * (config.step_max - config.step_min)
     return Draw(
-        learned=uniform[:, 0] >= config.p_uniform,
-        goal=uniform[:, 1] < config.goal_bias,
-        q_rand=q_min + uniform[:, 3 : 3 + d] * (q_max - q_min),
+        learned=uniform[..., 0] >= config.p_uniform,
+        goal=uniform[..., 1] < config.goal_bias,
+        q_rand=q_min + uniform[..., 3 : 3 + d] * (q_max - q_min),
         segment=Segment(
             normal / jnp.linalg.norm(normal, axis=-1, keepdims=True), length
         ),
@@ -68,19 +68,20 @@ def mixture(
 
     Args:
         draw: The expansion's random numbers.
-        learned: `[P]` whether this expansion uses the learned segment.
-        segment: `[P]` next learned segments.
-        q_goal: `[P, d]` root of the other tree, or the goal of the only one [rad].
+        learned: `[P, K]` whether this expansion uses the learned segment.
+        segment: `[P, K]` next learned segments.
+        q_goal: `[P, K, d]`, or with one axis for all workers, the root of the other tree,
+            or the goal of the only one [rad].
         config: Planner settings.
 
     Returns:
-        The proposal, and `[P]` whether it is a learned one.
+        The proposal, and `[P, K]` whether it is a learned one.
     """
     learned = learned & usable(segment)
     to_goal = ~learned & draw.goal
     norm = jnp.linalg.norm(segment.direction, axis=-1, keepdims=True)
     length = jnp.clip(segment.length, config.step_min, config.step_max)
-    at_goal, row = (learned | to_goal)[:, None], learned[:, None]
+    at_goal, row = (learned | to_goal)[..., None], learned[..., None]
     proposal = Proposal(
         target=jnp.where(at_goal, q_goal, draw.q_rand),
         direction=jnp.where(row, segment.direction / norm, draw.segment.direction),

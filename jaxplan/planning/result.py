@@ -5,8 +5,6 @@ from typing import NamedTuple
 
 import jax
 
-from jaxplan.planning.tree import Tree
-
 
 class Status(IntEnum):
     """How the search of one problem ended."""
@@ -25,10 +23,7 @@ class Status(IntEnum):
 
 
 class PlanResult(NamedTuple):
-    """The answer to P problems; W waypoints at most, N nodes, d joints.
-
-    No field depends on how many proposals were checked at a time, except `checked`.
-    """
+    """The answer to P problems; W waypoints at most, d joints."""
 
     path: jax.Array
     """`[P, W, d]` from q_start to q_goal or the best node, the last point repeated [rad]."""
@@ -37,13 +32,10 @@ class PlanResult(NamedTuple):
     status: jax.Array
     """`[P]` a `Status`."""
     expansions: jax.Array
-    """`[P]` proposals in sequential order, accepted and rejected, each connect step one."""
+    """`[P]` proposals, accepted and rejected, each connect step one."""
     accepted: jax.Array
     """`[P]` expansions that added a node."""
     learned: jax.Array
     """`[P]` learned segments drawn from the bank."""
-    checked: jax.Array
-    """`[P]` motions sent to collision checking, speculative ones included."""
-    flags: jax.Array
-    """`[P, max_expansions]` whether expansion k was accepted."""
-    tree: Tree
+    checks: jax.Array
+    """`[P]` configurations of motions that were checked."""

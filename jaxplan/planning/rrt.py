@@ -1,4 +1,4 @@
-"""RRT as in Algorithm 1, with the goal-connect rule as a switch.
+"""RRT as in Algorithm 1, with the goal-connect rule as a switch; what one worker does.
 
 grow:     a proposal of the mixture; accepted within `goal_connect` of q_goal -> connect
 connect:  straight steps from the newest node to q_goal; blocked -> grow
@@ -21,16 +21,17 @@ def roots(query: Query) -> jax.Array:
 
 
 def begin(query: Query, config: PlannerConfig) -> Control:
-    """The root is the first accepted node."""
-    zero = jnp.zeros(query.q_start.shape[0], jnp.int32)
-    gap = distance(query.q_start, query.q_goal, config.metric)
-    connecting = (gap > 0) & (gap <= config.goal_connect)
-    solved = ~connecting & (gap <= config.goal_tolerance)
+    """The root is the first accepted node, and the first worker's."""
+    shape = len(query.q_start), config.workers
+    zero, first = jnp.zeros(shape, jnp.int32), jnp.arange(config.workers) == 0
+    gap = distance(query.q_start, query.q_goal, config.metric)[:, None]
+    connecting = first & (gap > 0) & (gap <= config.goal_connect)
+    solved = first & ~connecting & (gap <= config.goal_tolerance)
     return Control(zero, connecting, connecting, zero, zero, solved)
 
 
 def asks(control: Control, draw: Draw, config: PlannerConfig) -> jax.Array:
-    """`[P]` whether the next move needs a learned segment."""
+    """`[P, K]` whether the next move needs a learned segment."""
     del config
     return ~control.connecting & draw.learned
 
@@ -46,8 +47,9 @@ def propose(
 ) -> Move:
     """A proposal of the mixture, or the next straight step to q_goal."""
     del tree
-    proposal, learned = mixture(draw, asking, segment, query.q_goal, config)
-    move = straightened(proposal, control.connecting, query.q_goal, config.step_max)
+    q_goal = query.q_goal[:, None]
+    proposal, learned = mixture(draw, asking, segment, q_goal, config)
+    move = straightened(proposal, control.connecting, q_goal, config.step_max)
     return Move(move, learned)
 
 
@@ -55,9 +57,9 @@ def advance(
     control: Control, outcome: Outcome, query: Query, config: PlannerConfig
 ) -> Control:
     """What follows an accepted or a rejected move."""
-    ok = outcome.accepted
-    gap_new = distance(outcome.q_new, query.q_goal, config.metric)
-    gap_base = distance(outcome.q_base, query.q_goal, config.metric)
+    ok, q_goal = outcome.accepted, query.q_goal[:, None]
+    gap_new = distance(outcome.q_new, q_goal, config.metric)
+    gap_base = distance(outcome.q_base, q_goal, config.metric)
     close = control.connecting | (gap_new <= config.goal_connect)
     connecting = ok & close & (gap_new > 0)
     # a blocked connection ends at its base, which may be near enough already
@@ -65,6 +67,7 @@ def advance(
     return control._replace(
         connecting=connecting,
         chained=connecting,
+        newest=jnp.where(ok, outcome.slot, control.newest),
         solved=~connecting & (gap <= config.goal_tolerance),
     )
 
@@ -72,7 +75,7 @@ def advance(
 def ends(
     tree: Tree, control: Control, query: Query, config: PlannerConfig
 ) -> tuple[jax.Array, jax.Array]:
-    """The best node reached, q_reach, and no second tree to go on in."""
-    side = jnp.zeros_like(control.side)
-    best = nearest(tree, side, query.q_goal, config.metric)
+    """The best node reached, q_reach, and no second tree to go on in; `[P]` each."""
+    side = jnp.zeros_like(control.side[:, :1])
+    best = nearest(tree, side, query.q_goal[:, None], config.metric)[:, 0]
     return best, jnp.full_like(best, -1)

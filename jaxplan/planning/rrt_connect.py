@@ -4,9 +4,10 @@
     connect:  straight steps of the other tree to the new node; blocked -> that tree grows
     solved:   the two trees meet
 
-The start's tree grows as in Algorithm 1. The goal's tree mirrors it: base nearest to
-q_start, learned directions reversed, since the sampler knows paths from start to goal only.
-The first thing tried is the straight motion from q_start to q_goal.
+This is what one worker does; several of them share the trees. The start's tree grows as
+in Algorithm 1. The goal's tree mirrors it: base nearest to q_start, learned directions
+reversed, since the sampler knows paths from start to goal only. The first thing that the
+first worker tries is the straight motion from q_start to q_goal.
 """
 
 import jax
@@ -16,7 +17,7 @@ from jaxplan.config import PlannerConfig
 from jaxplan.planning.proposal import Draw, mixture
 from jaxplan.planning.segment import Segment, straightened
 from jaxplan.planning.state import Control, Move, Outcome, Query
-from jaxplan.planning.tree import Tree, at, nearest
+from jaxplan.planning.tree import Tree, configurations, nearest
 
 START, GOAL = 0, 1
 
@@ -27,15 +28,16 @@ def roots(query: Query) -> jax.Array:
 
 
 def begin(query: Query, config: PlannerConfig) -> Control:
-    """The start's tree connects to the root of the goal's tree."""
-    del config
-    zero = jnp.zeros(query.q_start.shape[0], jnp.int32)
-    no = jnp.zeros_like(zero, bool)
-    return Control(zero, ~no, no, zero + GOAL, zero, no)
+    """One worker connects the start's tree to the goal's root; the others grow, in turn."""
+    shape = len(query.q_start), config.workers
+    zero, worker = jnp.zeros(shape, jnp.int32), jnp.arange(config.workers)
+    no = jnp.zeros(shape, bool)
+    side = jnp.broadcast_to((worker % 2).astype(jnp.int32), shape)
+    return Control(side, no | (worker == 0), no, zero, zero + GOAL, no)
 
 
 def asks(control: Control, draw: Draw, config: PlannerConfig) -> jax.Array:
-    """`[P]` whether the next move needs a learned segment."""
+    """`[P, K]` whether the next move needs a learned segment."""
     learns = (config.goal_tree == "mirrored") | (control.side == START)
     return ~control.connecting & draw.learned & learns
 
@@ -50,12 +52,12 @@ def propose(
     config: PlannerConfig,
 ) -> Move:
     """A proposal of the mixture, mirrored in the goal's tree, or the next straight step."""
-    forward = (control.side == START)[:, None]
-    towards = jnp.where(forward, query.q_goal, query.q_start)
+    forward = (control.side == START)[..., None]
+    towards = jnp.where(forward, query.q_goal[:, None], query.q_start[:, None])
     direction = jnp.where(forward, segment.direction, -segment.direction)
     segment = Segment(direction, segment.length)
     proposal, learned = mixture(draw, asking, segment, towards, config)
-    q_aim = at(tree.q, control.aim)
+    q_aim = configurations(tree, control.aim)
     move = straightened(proposal, control.connecting, q_aim, config.step_max)
     return Move(move, learned)
 
@@ -67,10 +69,11 @@ def advance(
     del query, config
     ok, was = outcome.accepted, control.connecting
     met = was & ok & outcome.reached
-    return control._replace(
+    return Control(
         side=jnp.where(was, control.side, 1 - control.side),
         connecting=ok & ~met,
         chained=was & ok & ~met,
+        newest=jnp.where(ok, outcome.slot, control.newest),
         aim=jnp.where(~was & ok, outcome.slot, control.aim),
         solved=met,
     )
@@ -79,12 +82,16 @@ def advance(
 def ends(
     tree: Tree, control: Control, query: Query, config: PlannerConfig
 ) -> tuple[jax.Array, jax.Array]:
-    """The node where the trees meet, in either tree; unsolved: the best one, and none."""
-    best = nearest(tree, jnp.zeros_like(control.side), query.q_goal, config.metric)
-    newest, forward = tree.size - 1, control.side == START
-    node = jnp.where(forward, newest, control.aim)
-    joint = jnp.where(forward, control.aim, newest)
-    return (
-        jnp.where(control.solved, node, best),
-        jnp.where(control.solved, joint, -1),
+    """`[P]` the node where the trees meet, in either tree; unsolved: the best one, and none."""
+    best = nearest(
+        tree, jnp.zeros_like(control.side[:, :1]), query.q_goal[:, None], config.metric
+    )[:, 0]
+    first = jnp.argmax(control.solved, axis=1)[:, None]
+    newest, aim, side = (
+        jnp.take_along_axis(leaf, first, axis=1)[:, 0]
+        for leaf in (control.newest, control.aim, control.side)
     )
+    node = jnp.where(side == START, newest, aim)
+    joint = jnp.where(side == START, aim, newest)
+    solved = jnp.any(control.solved, axis=1)
+    return jnp.where(solved, node, best), jnp.where(solved, joint, -1)

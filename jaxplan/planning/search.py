@@ -1,148 +1,246 @@
-"""The search loop: many proposals checked in one call, the tree of one at a time.
+"""The search loop: K workers of each problem share its trees.
 
-An algorithm (`rrt`, `rrt_connect`) is a machine with discrete control. From its control it
-proposes one move; the verdict on that move gives the next control. A round takes K moves:
+An algorithm (`rrt`, `rrt_connect`) is a machine with discrete control. From its control a
+worker proposes one move; the verdict on that move gives its next control. A round:
 
-    speculate  runs the machine K moves ahead as if every motion were free; no collision calls
-    check      the motions of all P problems in one call of `check_rows` rows. K is what
-               fits: 1 while many problems search, up to `proposals` for the last few
-    settle     commits moves in order, as long as the machine alone would have made them:
-               every earlier move was committed; the base is not a rejected node; and the
-               move before was either free, as assumed, or its verdict changes nothing that
-               follows (`fork` false)
+    propose    every worker from the same state of the trees
+    check      the motions of all workers of all problems together (`edges`)
+    commit     the free ones become nodes, in the order of the workers
 
-A base that was nearest among the tree and the speculated nodes is nearest among those of
-them that stand, if it stands. So the committed moves are those of K = 1, with the same
-random numbers (methods.md section 6.4), and `expansions` counts sequential expansions.
+With one worker this is the textbook algorithm, and `expansions` counts what the textbook
+counts. More workers find a way in fewer rounds, as one block of threads each does in
+pRRTC (arXiv 2503.06757), at the price of expansions that know nothing of each other.
 
-For example, K = 4 in an RRT, each base in brackets:  a(root) b(a) c(root) d(b), b blocked:
-a and c are added, b is counted as rejected, d is proposed anew since its base fell away.
+Everything about a problem depends on its own question, key and settings: neither on the
+other problems of a batch nor on its place among them.
 """
 
-from collections.abc import Callable
+from typing import TypeVar
 
 import jax
 import jax.numpy as jnp
 
 from jaxplan.config import PlannerConfig
 from jaxplan.planning import rrt, rrt_connect
+from jaxplan.planning.edges import ConfigFree, motions_free, points_for
+from jaxplan.planning.proposal import draw_numbers
 from jaxplan.planning.result import PlanResult, Status
-from jaxplan.planning.segment import Limits, Segment
-from jaxplan.planning.speculation import settle, speculate
-from jaxplan.planning.state import Query, State, searching
-from jaxplan.planning.tree import extract_path, plant
+from jaxplan.planning.segment import Limits, Segment, extend
+from jaxplan.planning.state import Move, Outcome, Query, State, searching
+from jaxplan.planning.tree import (
+    at,
+    bare,
+    configurations,
+    distances,
+    extract_path,
+    first_min,
+    insert,
+    nearest,
+    plant,
+)
 
+T = TypeVar("T")
 METHODS = {"rrt": rrt, "rrt_connect": rrt_connect}
 LIMIT_SLACK = 1e-4
 """How far a start or goal may lie outside the limits [rad]: rounding, no more."""
+MAX_WAYPOINTS = 512
+"""A longer path does not count as found."""
 
-MotionFree = Callable[[jax.Array, jax.Array, jax.Array], jax.Array]
-ConfigFree = Callable[[jax.Array, jax.Array], jax.Array]
+
+def examine(query: Query, limits: Limits) -> tuple[Query, jax.Array]:
+    """Checks all of the questions but for collisions.
+
+    Args:
+        query: P problems.
+        limits: `(q_min [d], q_max [d])` [rad].
+
+    Returns:
+        The query, finite everywhere, and `[P]` statuses: BUDGET_EXHAUSTED where there is
+        something to search.
+    """
+    given = jnp.stack(query[:3])
+    finite = jnp.all(jnp.isfinite(given), axis=(0, 2))
+    middle = 0.5 * (limits[0] + limits[1])
+    query = Query(*jnp.where(finite[:, None], given, middle), query.key)
+    ends = jnp.stack([query.q_start, query.q_goal])
+    over = (ends < limits[0] - LIMIT_SLACK) | (ends > limits[1] + LIMIT_SLACK)
+    over = jnp.any(over, axis=(0, 2))
+    status = jnp.where(over, Status.OUT_OF_LIMITS, Status.BUDGET_EXHAUSTED)
+    status = jnp.where(finite, status, Status.INVALID_INPUT)
+    return query, status.astype(jnp.int32)
+
+
+def empty(problems: int, joints: int, keys: jax.Array, config: PlannerConfig) -> State:
+    """A state of P problems that searches nothing; `keys [P]` of any kind."""
+    q, zero = jnp.zeros((problems, joints)), jnp.zeros(problems, jnp.int32)
+    query = Query(q, q, q, keys)
+    return State(
+        query=query,
+        tree=bare(problems, joints, config.max_expansions + 2),
+        control=METHODS[config.method].begin(query, config),
+        status=jnp.full_like(zero, Status.INACTIVE),
+        waiting=jnp.zeros_like(zero, bool),
+        chunk=zero,
+        used=zero,
+        expansions=zero,
+        accepted=zero,
+        checks=zero,
+    )
 
 
 def start(
+    state: State,
+    where: jax.Array,
     query: Query,
-    active: jax.Array,
+    status: jax.Array,
+    config: PlannerConfig,
+) -> State:
+    """Begins with other problems; the counters stay as they are.
+
+    Args:
+        state: From `empty` or a search.
+        where: `[P]` which rows begin anew.
+        query: `[P]` their questions.
+        status: `[P]` BUDGET_EXHAUSTED where there is something to search.
+        config: Planner settings.
+    """
+    method = METHODS[config.method]
+    control = method.begin(query, config)
+    found = (status == Status.BUDGET_EXHAUSTED) & jnp.any(control.solved, axis=1)
+    status = jnp.where(found, Status.SOLVED, status).astype(jnp.int32)
+    return state._replace(
+        query=choose(where, query, state.query),
+        tree=plant(state.tree, method.roots(query), where),
+        control=choose(where, control, state.control),
+        status=jnp.where(where, status, state.status),
+        waiting=state.waiting & ~where,
+    )
+
+
+def choose(where: jax.Array, new: T, old: T) -> T:
+    """Rows of `new` where `where [P]`, of `old` elsewhere, in all leaves."""
+    return jax.tree.map(
+        lambda a, b: jnp.where(where.reshape(-1, *(1,) * (a.ndim - 1)), a, b), new, old
+    )
+
+
+def advance(
+    state: State,
+    able: jax.Array,
+    bank: Segment | None,
     config_free: ConfigFree,
     limits: Limits,
     config: PlannerConfig,
 ) -> State:
-    """Checks the questions and plants the trees.
+    """One round.
 
     Args:
-        query: P problems.
-        active: `[P]` false for padding lanes.
-        config_free: `(problem [R], q [R, d]) -> [R]`.
+        state: From `start` or an earlier round.
+        able: `[P]` which problems take part.
+        bank: `[P, M]` segments, M >= K, of each problem those from `state.chunk * M` on.
+            None: uniform proposals only.
+        config_free: The check of configurations.
         limits: `(q_min [d], q_max [d])` [rad].
         config: Planner settings.
 
     Returns:
-        A state in which only sound, active problems are searching.
+        The state; a problem that is `waiting` now needs the next `M` segments first.
     """
-    lane = jnp.arange(query.q_start.shape[0], dtype=jnp.int32)
-    ends = jnp.stack([query.q_start, query.q_goal])
-    given = jnp.concatenate([ends, query.q_toggle[None]])
-    finite = jnp.all(jnp.isfinite(given), axis=(0, 2))
-    middle = 0.5 * (limits[0] + limits[1])
-    query = query._replace(
-        q_start=jnp.where(finite[:, None], query.q_start, middle),
-        q_goal=jnp.where(finite[:, None], query.q_goal, middle),
-        q_toggle=jnp.where(finite[:, None], query.q_toggle, middle),
-    )
-    ends = jnp.stack([query.q_start, query.q_goal])
-    over = (ends < limits[0] - LIMIT_SLACK) | (ends > limits[1] + LIMIT_SLACK)
-    rows = ends.reshape(-1, ends.shape[-1])
-    free = config_free(jnp.tile(lane, 2), rows).reshape(2, -1)
+    method, control, query = METHODS[config.method], state.control, state.query
+    worker = jnp.arange(config.workers, dtype=jnp.int32)
+    number = state.expansions[:, None] + worker
+    draw = draw_numbers(query.key, number, limits, config)
+    running = able[:, None] & (number < config.max_expansions)
+    if bank is None:
+        asking, segment = jnp.zeros_like(running), draw.segment
+        waiting = jnp.zeros_like(able)
+    else:
+        asking = running & method.asks(control, draw, config)
+        rows = bank.length.shape[1]
+        row = state.used[:, None] + jnp.cumsum(asking, axis=1) - 1
+        row -= state.chunk[:, None] * rows
+        waiting = able & jnp.any(asking & (row >= rows), axis=1)
+        running, asking = (x & ~waiting[:, None] for x in (running, asking))
+        row = jnp.clip(row, 0, rows - 1)
+        segment = Segment(at(bank.direction, row), at(bank.length, row))
 
-    method = METHODS[config.method]
-    control = method.begin(query, config)
-    status = jnp.where(control.solved, Status.SOLVED, Status.BUDGET_EXHAUSTED)
-    status = jnp.where(free[1], status, Status.GOAL_IN_COLLISION)
-    status = jnp.where(free[0], status, Status.START_IN_COLLISION)
-    status = jnp.where(jnp.any(over, axis=(0, 2)), Status.OUT_OF_LIMITS, status)
-    status = jnp.where(finite, status, Status.INVALID_INPUT)
-    status = jnp.where(active, status, Status.INACTIVE).astype(jnp.int32)
+    move = method.propose(control, state.tree, draw, asking, segment, query, config)
+    base = jnp.where(control.chained, control.newest, _base(state, move, config))
+    q_base = configurations(state.tree, base)
+    q_new, reached = extend(q_base, move.proposal, limits)
+    moves = reached | (jnp.linalg.norm(q_new - q_base, axis=-1) > 1e-6)
+
+    free, checks = _check(config_free, q_base, q_new, running & moves, config)
+    slot = state.tree.size[:, None] + jnp.cumsum(free, axis=1, dtype=jnp.int32) - 1
+    tree = insert(state.tree, q_new, base, control.side, slot, free)
+    outcome = Outcome(free, slot, q_base, q_new, reached)
+    after = method.advance(control, outcome, query, config)
+    after = jax.tree.map(lambda a, b: jnp.where(running, a, b), after, control)
+    solved = able & jnp.any(after.solved, axis=1)
+    used = state.used + jnp.sum(asking, axis=1, dtype=jnp.int32)
+    chunk = state.chunk + waiting
+    if bank is not None:  # what is left of a bank is too little for a round
+        used = jnp.maximum(used, chunk * bank.length.shape[1])
     return State(
         query=query,
-        tree=plant(method.roots(query), config.max_expansions + 2),
-        control=control,
-        status=status,
-        waiting=jnp.zeros_like(active),
-        expansions=jnp.zeros_like(lane),
-        accepted=jnp.zeros_like(lane),
-        checked=jnp.zeros_like(lane),
-        flags=jnp.zeros((lane.size, config.max_expansions), bool),
+        tree=tree,
+        control=after,
+        status=jnp.where(solved, Status.SOLVED, state.status).astype(jnp.int32),
+        waiting=state.waiting | waiting,
+        chunk=chunk,
+        used=used,
+        expansions=state.expansions + jnp.sum(running, axis=1, dtype=jnp.int32),
+        accepted=state.accepted + jnp.sum(free, axis=1, dtype=jnp.int32),
+        checks=state.checks + checks,
     )
 
 
-def grow(
-    state: State,
-    bank: Segment | None,
-    motion_free: MotionFree,
-    limits: Limits,
+def _base(state: State, move: Move, config: PlannerConfig) -> jax.Array:
+    """SelectBase, and the tie-break toward q_toggle (section 4.3)."""
+    tree, side, target = state.tree, state.control.side, move.proposal.target
+    if config.toggle_tie_break <= 0:
+        return nearest(tree, side, target, config.metric)
+    gaps = distances(tree, side, target, config.metric)
+    anchor, least = first_min(gaps)
+    q_toggle = jnp.broadcast_to(state.query.q_toggle[:, None], target.shape)
+    to_toggle = distances(tree, side, q_toggle, config.metric)
+    ties = gaps <= least[..., None] + config.toggle_tie_break
+    tied, _ = first_min(jnp.where(ties, to_toggle, jnp.inf))
+    return jnp.where(move.learned, tied, anchor)
+
+
+def _check(
+    config_free: ConfigFree,
+    q0: jax.Array,
+    q1: jax.Array,
+    asked: jax.Array,
     config: PlannerConfig,
-) -> State:
-    """Searches until every problem is at its end or waits for more learned segments.
-
-    Args:
-        state: From `start` or an earlier `grow`.
-        bank: `[P, M]` segments, of each problem those from `chunk * M` on, with
-            `chunk = state.control.used // M`. None: uniform proposals only.
-        motion_free: `(problem [R], q0 [R, d], q1 [R, d]) -> [R]`.
-        limits: `(q_min [d], q_max [d])` [rad].
-        config: Planner settings.
-
-    Returns:
-        The state; problems that wait are those still `searching`.
-    """
-    method = METHODS[config.method]
-    lane = jnp.arange(state.status.size, dtype=jnp.int32)
-    ahead = lane.size * config.proposals
-    room = max(lane.size, min(ahead, config.check_rows))
-    first = state.control.used if bank is None else _chunk_start(state, bank)
-
-    def able(state: State) -> jax.Array:
-        return searching(state, config) & ~state.waiting
-
-    def round_(state: State) -> State:
-        depth = room // jnp.maximum(jnp.sum(able(state)), 1)
-        depth = jnp.minimum(depth, config.proposals)
-        trial = speculate(method, state, bank, first, depth, limits, config)
-        asked = (trial.running & trial.possible).reshape(ahead)
-        (rows,) = jnp.nonzero(asked, size=room, fill_value=0)
-        q0, q1 = (q.reshape(ahead, -1)[rows] for q in (trial.q_base, trial.q_new))
-        verdict = motion_free(rows % lane.size, q0, q1)
-        free = asked & verdict[jnp.clip(jnp.cumsum(asked) - 1, 0)]
-        return settle(method, state, trial, free.reshape(trial.running.shape), config)
-
-    state = state._replace(waiting=jnp.zeros_like(state.waiting))
-    return jax.lax.while_loop(lambda s: jnp.any(able(s)), round_, state)
+) -> tuple[jax.Array, jax.Array]:
+    """`[P, K]` which motions are free, and `[P]` how many configurations that took."""
+    problems, workers, d = q0.shape
+    problem = jnp.repeat(jnp.arange(problems, dtype=jnp.int32), workers)
+    points = points_for(config.step_max, config.edge_resolution)
+    free, checks = motions_free(
+        config_free,
+        problem,
+        q0.reshape(-1, d),
+        q1.reshape(-1, d),
+        asked.reshape(-1),
+        points,
+        rows_for(problems, config),
+    )
+    shape = problems, workers
+    return free.reshape(shape), checks.reshape(shape).sum(1, dtype=jnp.int32)
 
 
-def _chunk_start(state: State, bank: Segment) -> jax.Array:
-    """`[P]` number of the first segment in the bank."""
-    rows = bank.length.shape[1]
-    return state.control.used // rows * rows
+def rows_for(lanes: int, config: PlannerConfig) -> int:
+    """Configurations of one call: a single search has few at a time."""
+    return min(config.check_rows, max(64, 8 * lanes * config.workers))
+
+
+def waypoints(config: PlannerConfig) -> int:
+    """W: room for the longest path that there can be, up to `MAX_WAYPOINTS`."""
+    return min(config.max_expansions + 2, MAX_WAYPOINTS)
 
 
 def finish(state: State, config: PlannerConfig) -> PlanResult:
@@ -151,15 +249,14 @@ def finish(state: State, config: PlannerConfig) -> PlanResult:
     node, joint = method.ends(state.tree, state.control, state.query, config)
     searched = state.status <= Status.BUDGET_EXHAUSTED
     node, joint = jnp.where(searched, node, -1), jnp.where(searched, joint, -1)
-    path, path_length = extract_path(state.tree, node, joint)
+    path, path_length = extract_path(state.tree, node, joint, waypoints(config))
+    cut = path_length > path.shape[1]
     return PlanResult(
         path=path,
-        path_length=path_length,
-        status=state.status,
+        path_length=jnp.minimum(path_length, path.shape[1]),
+        status=jnp.where(cut, Status.BUDGET_EXHAUSTED, state.status),
         expansions=state.expansions,
         accepted=state.accepted,
-        learned=state.control.used,
-        checked=state.checked,
-        flags=state.flags,
-        tree=state.tree,
+        learned=state.used,
+        checks=state.checks,
     )

@@ -33,24 +33,24 @@ class Segment(NamedTuple):
 
 
 class Proposal(NamedTuple):
-    """One move for each of P problems."""
+    """One move for each of K workers of P problems."""
 
     target: jax.Array
-    """`[P, d]` the base is the node nearest to it [rad]."""
+    """`[P, K, d]` the base is the node nearest to it [rad]."""
     direction: jax.Array
-    """`[P, d]` unit vector."""
+    """`[P, K, d]` unit vector."""
     length: jax.Array
-    """`[P]` [rad]."""
+    """`[P, K]` [rad]."""
     toward: jax.Array
-    """`[P]` the move goes to `target` and not along `direction`."""
+    """`[P, K]` the move goes to `target` and not along `direction`."""
 
 
 def straightened(
     proposal: Proposal, connecting: jax.Array, q_aim: jax.Array, step: float
 ) -> Proposal:
-    """The proposal, but where `connecting` [P] a straight move of `step` to `q_aim` [P, d]."""
+    """The proposal, but where `connecting [P, K]` a straight move of `step` to `q_aim`."""
     return Proposal(
-        target=jnp.where(connecting[:, None], q_aim, proposal.target),
+        target=jnp.where(connecting[..., None], q_aim, proposal.target),
         direction=proposal.direction,
         length=jnp.where(connecting, step, proposal.length),
         toward=connecting | proposal.toward,
@@ -69,17 +69,17 @@ def extend(
     """Carries out a proposal from its base (equation 4, with the projection to limits).
 
     Args:
-        q_base: `[P, d]` [rad].
+        q_base: `[P, K, d]` [rad].
         proposal: Moves, one for each row of `q_base`.
         limits: Of the joints [rad].
 
     Returns:
-        `q_new [P, d]`, and `reached [P]`: whether it is the target, to the last bit.
+        `q_new [P, K, d]`, and `reached [P, K]`: whether it is the target, to the last bit.
     """
     gap = proposal.target - q_base
     distance = jnp.linalg.norm(gap, axis=-1)
     reached = proposal.toward & (distance <= SNAP * proposal.length)
-    straight = gap / jnp.maximum(distance, 1e-9)[:, None]
-    direction = jnp.where(proposal.toward[:, None], straight, proposal.direction)
-    q_new = jnp.clip(q_base + proposal.length[:, None] * direction, *limits)
-    return jnp.where(reached[:, None], proposal.target, q_new), reached
+    straight = gap / jnp.maximum(distance, 1e-9)[..., None]
+    direction = jnp.where(proposal.toward[..., None], straight, proposal.direction)
+    q_new = jnp.clip(q_base + proposal.length[..., None] * direction, *limits)
+    return jnp.where(reached[..., None], proposal.target, q_new), reached

@@ -1,4 +1,4 @@
-"""What a search carries: the questions, the control of the algorithm, and the counters."""
+"""What a search carries: the questions, the control of each worker, and the counters."""
 
 from typing import NamedTuple
 
@@ -24,20 +24,20 @@ class Query(NamedTuple):
 
 
 class Control(NamedTuple):
-    """Where each of P problems stands in its algorithm; all of it discrete."""
+    """Where each of the K workers of P problems stands in its algorithm; all of it discrete."""
 
     side: jax.Array
-    """`[P]` the tree that moves next."""
+    """`[P, K]` the tree that moves next."""
     connecting: jax.Array
-    """`[P]` the next move is a straight step and not a proposal of the mixture."""
+    """`[P, K]` the next move is a straight step and not a proposal of the mixture."""
     chained: jax.Array
-    """`[P]` the next move starts from the newest node and not from the nearest."""
+    """`[P, K]` the next move starts from the worker's newest node, not from the nearest."""
+    newest: jax.Array
+    """`[P, K]` the node that the worker added last."""
     aim: jax.Array
-    """`[P]` node that RRT-Connect's straight steps lead to."""
-    used: jax.Array
-    """`[P]` learned segments used so far."""
+    """`[P, K]` node that RRT-Connect's straight steps lead to."""
     solved: jax.Array
-    """`[P]`."""
+    """`[P, K]` this worker has found the way."""
 
 
 class Move(NamedTuple):
@@ -45,18 +45,21 @@ class Move(NamedTuple):
 
     proposal: Proposal
     learned: jax.Array
-    """`[P]` the proposal is a learned segment."""
+    """`[P, K]` the proposal is a learned segment."""
 
 
 class Outcome(NamedTuple):
-    """How a move came out; `slot` is where its node went if it was accepted."""
+    """How moves came out, `[P, K]` each."""
 
     accepted: jax.Array
     slot: jax.Array
+    """The node that it became if it was accepted."""
     q_base: jax.Array
+    """`[P, K, d]`."""
     q_new: jax.Array
+    """`[P, K, d]`."""
     reached: jax.Array
-    """`[P]` q_new is the target itself."""
+    """q_new is the target itself."""
 
 
 class State(NamedTuple):
@@ -68,12 +71,14 @@ class State(NamedTuple):
     status: jax.Array
     """`[P]` a `Status`; BUDGET_EXHAUSTED from the start on until it is solved."""
     waiting: jax.Array
-    """`[P]` the next move needs a learned segment that the bank does not have."""
+    """`[P]` the next moves need learned segments that the bank does not have."""
+    chunk: jax.Array
+    """`[P]` which bank comes next, or is in use."""
+    used: jax.Array
+    """`[P]` learned segments used so far."""
     expansions: jax.Array
     accepted: jax.Array
-    checked: jax.Array
-    flags: jax.Array
-    """`[P, max_expansions]`."""
+    checks: jax.Array
 
 
 def searching(state: State, config: PlannerConfig) -> jax.Array:

@@ -63,7 +63,7 @@ def find_contacts(model: mujoco.MjModel) -> tuple[Contact, ...]:
     known = {pair for contact in contacts for pair in geom_pairs(contact)}
     for i, j in zip(model.pair_geom1, model.pair_geom2, strict=True):
         a, b = (
-            Geoms(int(model.geom_bodyid[g]), _kind(model, g), (int(g),)) for g in (i, j)
+            Geoms(int(model.geom_bodyid[g]), kind_of(model, g), (int(g),)) for g in (i, j)
         )
         if (int(i), int(j)) not in known and (int(j), int(i)) not in known:
             contacts.append(_ordered(a, b))
@@ -81,7 +81,7 @@ def _alike(model: mujoco.MjModel) -> list[list[Geoms]]:
     for geom in range(model.ngeom):
         sets = alike[model.geom_bodyid[geom]]
         bits = int(model.geom_contype[geom]), int(model.geom_conaffinity[geom])
-        kind = _kind(model, geom)
+        kind = kind_of(model, geom)
         first = next(
             (
                 ids[0]
@@ -132,5 +132,6 @@ def _ordered(a: Geoms, b: Geoms) -> Contact:
     return Contact(*sorted((a, b), key=lambda g: (order.index(g.kind), -g.body)))
 
 
-def _kind(model: mujoco.MjModel, geom: int) -> str:
+def kind_of(model: mujoco.MjModel, geom: int) -> str:
+    """The name of a geom's kind, as in `KINDS`."""
     return KINDS[int(model.geom_type[geom])]

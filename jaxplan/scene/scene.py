@@ -1,15 +1,19 @@
 """A MuJoCo model as planning sees it: what the arm moves, what it can hold, what can touch.
 
-Numbers (poses and sizes of geoms, joint axes, limits) stay in an `mjx.Model`, a pytree:
-replace one and every query answers for the new scene without recompiling. Structure
-(which bodies, joints and pairs there are) is static and read once.
+Numbers (poses and sizes of geoms, joint axes, limits) are arrays, a pytree: replace one
+and every query answers for the new scene without recompiling. Structure (which bodies,
+joints and pairs there are) is static and read once.
+
+Obstacles that come and go between queries live in slots: geoms of a body `obstacles` whose
+poses and sizes are in the `World`.
 """
 
 import copy
 import dataclasses
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import partial
 from os import PathLike
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -17,8 +21,28 @@ import mujoco
 import numpy as np
 
 from jaxplan.scene.contacts import geom_pairs
-from jaxplan.scene.quiet_mjx import mjx
-from jaxplan.scene.structure import Group, Structure, known, read_structure
+from jaxplan.scene.structure import (
+    SLOTS,
+    Group,
+    Slot,
+    Structure,
+    known,
+    read_structure,
+)
+
+
+class Numbers(NamedTuple):
+    """The arrays of an `MjModel` that planning reads, under MuJoCo's names and shapes."""
+
+    body_pos: jax.Array
+    body_quat: jax.Array
+    geom_pos: jax.Array
+    geom_quat: jax.Array
+    geom_size: jax.Array
+    jnt_pos: jax.Array
+    jnt_axis: jax.Array
+    jnt_range: jax.Array
+    qpos0: jax.Array
 
 
 @partial(
@@ -28,9 +52,9 @@ from jaxplan.scene.structure import Group, Structure, known, read_structure
 )
 @dataclasses.dataclass(frozen=True, eq=False)
 class Scene:
-    """A pytree: the `mjx.Model` is its data, the structure is static."""
+    """A pytree: the numbers are its data, the structure is static."""
 
-    model: mjx.Model
+    model: Numbers
     structure: Structure
 
     @classmethod
@@ -39,6 +63,7 @@ class Scene:
         source: str | PathLike | mujoco.MjSpec | mujoco.MjModel,
         joints: Sequence[str] | None = None,
         hand: str | None = None,
+        slots: Mapping[str, int] | None = None,
     ) -> "Scene":
         """Reads a scene.
 
@@ -48,22 +73,27 @@ class Scene:
                 slide joint down the tree until it branches (where the fingers begin).
             hand: The body that carries what is held. None: the last body before the
                 tree branches.
+            slots: Room for obstacles that change between queries: how many of each kind
+                (sphere, capsule, cylinder, ellipsoid, box), such as `{"box": 16}`. They
+                can touch whatever can touch anything.
 
         Raises:
-            ValueError: A joint or body is not in the model, or cannot be planned for.
+            ValueError: A joint or body is not in the model, or cannot be planned for; a
+                geom that can touch the arm is a height field, a flex or an SDF.
         """
         if isinstance(source, mujoco.MjModel):
+            if slots:
+                raise ValueError("slots need a path, text or MjSpec; this is an MjModel")
             model = source
-        elif not isinstance(source, str | PathLike):
-            model = source.compile()
-        elif "<mujoco" in str(source):
-            model = mujoco.MjModel.from_xml_string(str(source))
         else:
-            model = mujoco.MjModel.from_xml_path(str(source))
-        return cls(mjx.put_model(model), read_structure(model, joints, hand))
+            spec = _spec(source)
+            _add_slots(spec, slots or {})
+            model = spec.compile()
+        numbers = Numbers(*(jnp.asarray(getattr(model, f)) for f in Numbers._fields))
+        return cls(numbers, read_structure(model, joints, hand))
 
     def replace(self, **fields: jax.Array) -> "Scene":
-        """The scene with fields of its `mjx.Model` replaced, e.g. `geom_pos`.
+        """The scene with some of its `Numbers` replaced, e.g. `geom_pos`.
 
         No recompilation follows, except from `geom_quat`: which boxes are parallel is
         structure, so that field must be concrete and gives a new structure.
@@ -73,7 +103,7 @@ class Scene:
             turned = copy.copy(self.mj_model)
             turned.geom_quat[:] = np.asarray(fields["geom_quat"])
             structure = read_structure(turned, self.joints, self.hand)
-        return Scene(self.model.replace(**fields), structure)
+        return Scene(self.model._replace(**fields), structure)
 
     @property
     def mj_model(self) -> mujoco.MjModel:
@@ -94,6 +124,11 @@ class Scene:
     def objects(self) -> tuple[str, ...]:
         """Bodies with a free joint: `World.object_pose` places them."""
         return self.structure.objects
+
+    @property
+    def slots(self) -> tuple[Slot, ...]:
+        """Room for obstacles: `World.slot_pose` and `World.slot_size` fill it."""
+        return self.structure.slots
 
     @property
     def hand(self) -> str:
@@ -119,6 +154,11 @@ class Scene:
         ids = np.array([self.mj_model.joint(name).id for name in self.joints])
         limited = self.mj_model.jnt_limited[ids] != 0
         return jnp.where(limited, self.model.jnt_range[ids, side], unlimited)
+
+    def joint_kind(self, name: str) -> str:
+        """hinge or slide."""
+        kind = self.mj_model.joint(name).type[0]
+        return "slide" if kind == mujoco.mjtJoint.mjJNT_SLIDE else "hinge"
 
     def ignored(self, names: Iterable[str]) -> np.ndarray:
         """`[n_groups]` mask of contact groups, for `World.ignored`.
@@ -162,3 +202,34 @@ class Scene:
         body = model.geom_bodyid[geom]
         number = geom - model.body_geomadr[body]
         return model.geom(geom).name or f"{model.body(body).name}[{number}]"
+
+
+def _spec(source: str | PathLike | mujoco.MjSpec) -> mujoco.MjSpec:
+    """A spec of the caller's own, which may be changed."""
+    if isinstance(source, mujoco.MjSpec):
+        return source.copy()
+    if "<mujoco" in str(source):
+        return mujoco.MjSpec.from_string(str(source))
+    return mujoco.MjSpec.from_file(str(source))
+
+
+def _add_slots(spec: mujoco.MjSpec, slots: Mapping[str, int]) -> None:
+    """Adds the body `obstacles` with geoms of size 1 that can touch everything."""
+    kinds = ("sphere", "capsule", "cylinder", "ellipsoid", "box")
+    if not any(slots.values()):
+        return
+    body = spec.worldbody.add_body(name=SLOTS)
+    for kind, count in slots.items():
+        for i in range(count):
+            body.add_geom(
+                name=f"{kind}{i}",
+                type=getattr(
+                    mujoco.mjtGeom, f"mjGEOM_{known(kind, 'kind', kinds).upper()}"
+                ),
+                size=[1, 1, 1],
+                pos=[0, 0, 0],
+                contype=2**31 - 1,
+                conaffinity=2**31 - 1,
+                mass=0,
+                group=3,
+            )

@@ -7,8 +7,10 @@ from typing import NamedTuple
 
 import mujoco
 
-from jaxplan.scene.contacts import Contact, find_contacts
+from jaxplan.scene.contacts import Contact, find_contacts, kind_of
 
+SLOTS = "obstacles"
+"""The body whose geoms are slots."""
 SIMPLE_JOINTS = int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE)
 
 
@@ -41,6 +43,13 @@ class Group(NamedTuple):
     """Objects of which one must be held for the contact to depend on q; () = always."""
 
 
+class Slot(NamedTuple):
+    """A geom whose pose and size are given with each query."""
+
+    geom: int
+    kind: str
+
+
 @dataclasses.dataclass(frozen=True, eq=False)
 class Structure:
     """What does not change when a geom moves. Compared by identity, so cheap under jit."""
@@ -50,6 +59,7 @@ class Structure:
     passive: tuple[str, ...]
     objects: tuple[str, ...]
     hand: str
+    slots: tuple[Slot, ...]
     groups: tuple[Group, ...]
     links: tuple[Link, ...]
     """Links that collision needs, row 1 first (row 0 is the world). Parents stand before
@@ -66,6 +76,8 @@ def read_structure(
     Raises:
         ValueError: A joint or body is not in the model, or cannot be planned for.
     """
+    if model.nflex:
+        raise ValueError("flexes are not supported: the model has a deformable body")
     chain, end = _chain(model)
     joints = chain if joints is None else tuple(joints)
     if not joints:
@@ -83,13 +95,20 @@ def read_structure(
     )
     free = model.jnt_bodyid[model.jnt_type == mujoco.mjtJoint.mjJNT_FREE]
     objects = tuple(model.body(b).name for b in free)
+    slots = tuple(
+        Slot(g, kind_of(model, g))
+        for g in range(model.ngeom)
+        if model.body(model.geom_bodyid[g]).name == SLOTS
+    )
     groups = _groups(model, joints, objects)
     needed = {int(model.body(hand).id)}
     for group in groups:
         needed |= {side.body for contact in group.contacts for side in contact}
     needed = {a for body in needed for a in _line(model, body)}
     links, link_of = _links(model, needed, (*joints, *passive), objects)
-    return Structure(model, joints, passive, objects, hand, groups, links, link_of)
+    return Structure(
+        model, joints, passive, objects, hand, slots, groups, links, link_of
+    )
 
 
 def known(name: str, kind: str, names: Sequence[str]) -> str:
@@ -136,8 +155,21 @@ def _groups(
         roots = [model.body(line[-1]).name for line in lines if line]
         held = tuple(objects.index(root) for root in roots if root in objects)
         if moved or held:
+            _refuse_unsupported(model, contacts)
             groups.append(Group(name, tuple(contacts), () if moved else held))
     return tuple(groups)
+
+
+def _refuse_unsupported(model: mujoco.MjModel, contacts: list[Contact]) -> None:
+    """Names a geom that planning cannot check, rather than to look past it."""
+    for side in (side for contact in contacts for side in contact):
+        if side.kind in ("hfield", "sdf"):
+            name = model.geom(side.ids[0]).name or f"geom {side.ids[0]}"
+            long = {"hfield": "a height field", "sdf": "a signed distance field"}
+            raise ValueError(
+                f"{name!r} is {long[side.kind]}, which is not supported: use a mesh or "
+                "boxes, or set its contype and conaffinity to 0"
+            )
 
 
 def _links(

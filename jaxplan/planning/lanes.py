@@ -1,0 +1,208 @@
+"""Many problems through a few lanes: a lane whose problem is over takes the next one.
+
+Problems differ in difficulty by orders of magnitude. In lockstep all would wait for the
+hardest; here every lane is busy until the queue is empty, in one compiled loop:
+
+    harvest   where a problem is over: check its path densely, write the answer down, load
+              the next problem; where one was loaded: check its start and goal
+    round     every lane goes on with its problem (`search.advance`)
+
+A path whose dense check fails is not an answer: its problem starts anew in its lane, with
+other random numbers and what is left of its budget.
+"""
+
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+
+from jaxplan.config import PlannerConfig
+from jaxplan.planning import search
+from jaxplan.planning.edges import ConfigFree, all_free
+from jaxplan.planning.result import PlanResult, Status
+from jaxplan.planning.segment import Limits, Segment
+from jaxplan.planning.state import Query, State, searching
+
+
+class Lanes(NamedTuple):
+    """P problems in L lanes."""
+
+    state: State
+    """Of the lanes."""
+    problem: jax.Array
+    """`[L]` what each lane works on; P = nothing."""
+    fresh: jax.Array
+    """`[L]` its start and goal are still to be checked."""
+    taken: jax.Array
+    """Problems that some lane has taken."""
+    answers: PlanResult
+    """Of the problems; what is not over yet is empty."""
+
+
+def begin(query: Query, status: jax.Array, lanes: int, config: PlannerConfig) -> Lanes:
+    """Loads the first L of P problems.
+
+    Args:
+        query: P problems.
+        status: `[P]` from `search.examine`.
+        lanes: L, at most P.
+        config: Planner settings.
+    """
+    problem = jnp.arange(lanes, dtype=jnp.int32)
+    problems, d = query.q_start.shape
+    state = search.empty(lanes, d, query.key[:lanes], config)
+    every = jnp.ones(lanes, bool)
+    state = search.start(state, every, *_load(query, status, problem), config)
+    zero = jnp.zeros(problems, jnp.int32)
+    answers = PlanResult(
+        path=jnp.zeros((problems, search.waypoints(config), d)),
+        path_length=zero,
+        status=status,
+        expansions=zero,
+        accepted=zero,
+        learned=zero,
+        checks=zero,
+    )
+    return Lanes(state, problem, every, jnp.int32(lanes), answers)
+
+
+def run(
+    lanes: Lanes,
+    query: Query,
+    status: jax.Array,
+    bank: Segment | None,
+    config_free: ConfigFree,
+    limits: Limits,
+    config: PlannerConfig,
+) -> Lanes:
+    """Goes on until all problems are answered or wait for more learned segments.
+
+    Args:
+        lanes: From `begin` or an earlier `run`.
+        query: P problems.
+        status: `[P]` from `search.examine`.
+        bank: As for `search.advance`, of the lanes.
+        config_free: The check of configurations; `problem` counts the P problems.
+        limits: `(q_min [d], q_max [d])` [rad].
+        config: Planner settings.
+    """
+    problems = len(status)
+
+    def able(lanes: Lanes) -> jax.Array:
+        return searching(lanes.state, config) & ~lanes.state.waiting & ~lanes.fresh
+
+    def due(lanes: Lanes) -> jax.Array:
+        over = lanes.fresh | ~searching(lanes.state, config)
+        return over & (lanes.problem < problems)
+
+    def turn(lanes: Lanes) -> Lanes:
+        def harvest(lanes: Lanes) -> Lanes:
+            return _harvest(lanes, due(lanes), query, status, config_free, config)
+
+        lanes = jax.lax.cond(jnp.any(due(lanes)), harvest, lambda same: same, lanes)
+        here = jnp.minimum(lanes.problem, problems - 1)
+
+        def free(lane: jax.Array, q: jax.Array) -> jax.Array:
+            return config_free(here[lane], q)
+
+        state = search.advance(lanes.state, able(lanes), bank, free, limits, config)
+        return lanes._replace(state=state)
+
+    state = lanes.state._replace(waiting=jnp.zeros_like(lanes.state.waiting))
+    return jax.lax.while_loop(
+        lambda lanes: jnp.any(able(lanes) | due(lanes)),
+        turn,
+        lanes._replace(state=state),
+    )
+
+
+def _load(
+    query: Query, status: jax.Array, problem: jax.Array
+) -> tuple[Query, jax.Array]:
+    """The questions of `problem [L]`; a lane without one has nothing to search."""
+    row = jnp.minimum(problem, len(status) - 1)
+    query = jax.tree.map(lambda leaf: leaf[row], query)
+    return query, jnp.where(problem < len(status), status[row], Status.INACTIVE)
+
+
+def _harvest(
+    lanes: Lanes,
+    due: jax.Array,
+    query: Query,
+    status: jax.Array,
+    config_free: ConfigFree,
+    config: PlannerConfig,
+) -> Lanes:
+    """Looks after the lanes that are `due [L]`: a new question, or an answer to write down."""
+    state, problems = lanes.state, len(status)
+    found = search.finish(state, config)
+    opening = due & lanes.fresh & (state.status == Status.BUDGET_EXHAUSTED)
+    solved = due & ~lanes.fresh & (found.status == Status.SOLVED)
+    sound, start_free, goal_free = _check(
+        lanes, found, opening, solved, config_free, config
+    )
+    opened = jnp.where(goal_free, state.status, Status.GOAL_IN_COLLISION)
+    opened = jnp.where(start_free, opened, Status.START_IN_COLLISION)
+    state = state._replace(status=opened.astype(jnp.int32))
+    found = found._replace(
+        status=jnp.where(sound, found.status, Status.BUDGET_EXHAUSTED),
+        path_length=jnp.where(sound, found.path_length, 1),
+    )
+    anew = ~sound & (state.expansions < config.max_expansions)
+    done = due & ~lanes.fresh & ~anew
+    row = jnp.where(done, lanes.problem, problems)
+    answers = PlanResult(
+        *(
+            all_.at[row].set(one, mode="drop")
+            for all_, one in zip(lanes.answers, found, strict=True)
+        )
+    )
+    problem = lanes.taken + jnp.cumsum(done, dtype=jnp.int32) - 1
+    problem = jnp.where(done, jnp.minimum(problem, problems), lanes.problem)
+    loaded = done & (problem < problems)
+    begins = loaded | anew
+    state = search.start(state, begins, *_load(query, status, problem), config)
+    # A new attempt goes on counting, and so draws other random numbers.
+    for name in ("chunk", "used", "expansions", "accepted", "checks"):
+        count = jnp.where(loaded, 0, getattr(state, name))
+        state = state._replace(**{name: count})
+    return Lanes(
+        state=state,
+        problem=problem,
+        fresh=loaded,
+        taken=lanes.taken + jnp.sum(done, dtype=jnp.int32),
+        answers=answers,
+    )
+
+
+def _check(
+    lanes: Lanes,
+    found: PlanResult,
+    opening: jax.Array,
+    solved: jax.Array,
+    config_free: ConfigFree,
+    config: PlannerConfig,
+) -> tuple[jax.Array, jax.Array, jax.Array]:
+    """`[L]` each: path sound if `solved`, start and goal free if `opening`. One pass for all."""
+    count, waypoints, d = found.path.shape
+    dense = config.path_resolution > 0
+    gaps = jnp.linalg.norm(found.path[:, 1:] - found.path[:, :-1], axis=-1)
+    places = jnp.ceil(gaps / config.path_resolution) if dense else 0 * gaps
+    edge = jnp.arange(waypoints - 1)
+    counts = jnp.where(
+        solved[:, None] & (edge < found.path_length[:, None] - 1) & dense,
+        jnp.maximum(places, 1).astype(jnp.int32),
+        0,
+    )
+    lane = jnp.arange(count, dtype=jnp.int32)
+    ends = jnp.concatenate(lanes.state.query[:2])
+    free = all_free(
+        config_free,
+        lanes.problem[jnp.concatenate([jnp.repeat(lane, waypoints - 1), lane, lane])],
+        jnp.concatenate([found.path[:, :-1].reshape(-1, d), ends]),
+        jnp.concatenate([found.path[:, 1:].reshape(-1, d), ends]),
+        jnp.concatenate([counts.reshape(-1), opening, opening], dtype=jnp.int32),
+        search.rows_for(count, config),
+    )
+    paths, start_free, goal_free = jnp.split(free, [counts.size, counts.size + count])
+    return paths.reshape(counts.shape).all(1), start_free, goal_free
