@@ -49,8 +49,8 @@ class PlannerConfig:
     """Problems of a batch that are searched side by side; the others wait for a free lane."""
     check_rows: int = 256
     """Configurations of one collision call, about. More pays on a GPU; the trees are the same."""
-    margin: float = 0.002
-    """Clearance that a configuration needs to count as free [m]."""
+    margin: float = 0.0
+    """Clearance that a configuration needs to count as free [m]; 0 = C MuJoCo's own verdict."""
     edge_resolution: float = 1 / 32
     """Longest gap between checked configurations of a motion [rad]."""
     path_resolution: float = 0.01

@@ -1,6 +1,6 @@
 """Problems among spheres in joint space, and a sequential planner to compare with.
 
-Motions are checked in closed form; the planner is plain NumPy, one problem at a time.
+The planner is plain NumPy, one problem and one expansion at a time.
 """
 
 from functools import partial
@@ -10,7 +10,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxplan.planning import Segment
+from jaxplan.planning import Segment, points_for
 from jaxplan.planning.proposal import draw_numbers
 
 Q_MAX = 2.0
@@ -29,12 +29,12 @@ def config_free(worlds, problem, q):
     return ((gap**2).sum(-1) > worlds.radius[problem] ** 2).all(-1)
 
 
-def motion_free(worlds, problem, q0, q1):
-    """Of NumPy and of JAX arrays alike, by the point of the motion nearest to a centre."""
-    centre, edge = worlds.centre[problem], (q1 - q0)[:, None]
-    along = ((centre - q0[:, None]) * edge).sum(-1) / (edge**2).sum(-1).clip(1e-12)
-    nearest = q0[:, None] + along.clip(0, 1)[..., None] * edge
-    return (((centre - nearest) ** 2).sum(-1) > worlds.radius[problem] ** 2).all(-1)
+def points_free(worlds, problem, q0, q1, points):
+    """Whether the places on motions that a planner checks are free; of NumPy arrays."""
+    share = (np.arange(points) + 1)[:, None, None] / points
+    return np.all(
+        [config_free(worlds, problem, q) for q in q0 + share * (q1 - q0)], axis=0
+    )
 
 
 def problems(count, d=7, spheres=12, seed=0):
@@ -87,8 +87,8 @@ class Oracle:
         d = q_start.size
         k = jnp.arange(config.max_expansions)
         limits = jnp.full(d, -Q_MAX), jnp.full(d, Q_MAX)
-        numbers = draw_numbers(jnp.broadcast_to(key, k.shape), k, limits, config)
-        self.draws = jax.tree.map(np.asarray, numbers)
+        numbers = draw_numbers(key[None], k[None], limits, config)
+        self.draws = jax.tree.map(lambda x: np.asarray(x[0]), numbers)
         self.world, self.segments, self.config = world, segments, config
         self.q_start, self.q_goal, self.q_toggle = q_start, q_goal, q_toggle
         self.q, self.parent, self.side = [q_start], [-1], [0]
@@ -111,10 +111,10 @@ class Oracle:
         return min(tied, key=lambda i: self.d(self.q[i], self.q_toggle))
 
     def free(self, q0, q1):
-        edge = q1 - q0
-        along = (self.world.centre - q0) @ edge / max(edge @ edge, 1e-12)
-        nearest = q0 + np.clip(along, 0, 1)[:, None] * edge
-        gap = ((self.world.centre - nearest) ** 2).sum(-1)
+        points = points_for(self.config.step_max, self.config.edge_resolution)
+        share = (np.arange(points, dtype=np.float32) + 1)[:, None] / points
+        q = np.where(share == 1, q1, q0 + share * (q1 - q0))[:, None]
+        gap = ((q - self.world.centre) ** 2).sum(-1)
         return bool((gap > self.world.radius**2).all())
 
     def move(self, base, side, target, length, direction=None):

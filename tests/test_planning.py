@@ -1,4 +1,4 @@
-"""The batched planner against a sequential NumPy one, and the laws of a search tree."""
+"""The batched search against a sequential NumPy one, and the laws of a search tree."""
 
 from dataclasses import replace
 from functools import cache
@@ -15,65 +15,178 @@ from planning_spheres import (
     Oracle,
     Spheres,
     config_free,
-    motion_free,
     noisy_sampler,
+    points_free,
     problems,
 )
 
-from jaxplan.config import PlannerConfig
-from jaxplan.planning import Segment, Status, make_planner
+from jaxplan.config import PAPER_PLANNER
+from jaxplan.planning import PlanResult, Segment, Status, lanes, make_planner, search
+from jaxplan.planning.edges import all_free, motions_free, points_for, stages
+from jaxplan.planning.state import Query
 
 METHODS = ("rrt", "rrt_connect")
-LITERAL = PlannerConfig(
-    method="rrt", goal_connect=0.0, goal_bias=0.0, uniform_mode="independent"
+LITERAL = replace(
+    PAPER_PLANNER,
+    method="rrt",
+    goal_connect=0.0,
+    goal_bias=0.0,
+    uniform_mode="independent",
 )
+
+
+def settings_of(**changes):
+    return replace(PAPER_PLANNER, **changes)
 
 
 @cache
 def planner(config, d=7):
     limit = np.full(d, Q_MAX)
-    return make_planner(motion_free, config_free, config, -limit, limit)
+    return make_planner(config_free, config, -limit, limit)
 
 
-def assert_same_search(a, b):
-    """Same parents, flags and counts; configurations within 1e-6 rad."""
-    for name in ("status", "expansions", "accepted", "learned", "flags", "path_length"):
+@cache
+def _grown(config, d):
+    limits = jnp.full(d, -Q_MAX), jnp.full(d, Q_MAX)
+
+    @jax.jit
+    def grow(worlds, state, query, status, bank):
+        def free(problem, q):
+            return config_free(worlds, problem, q)
+
+        return lanes.run(state, query, status, bank, free, limits, config)
+
+    def begin(query):
+        query, status = search.examine(query, limits)
+        return lanes.begin(query, status, len(status), config), query, status
+
+    return jax.jit(begin), grow
+
+
+def searched_trees(config, worlds, q_start, q_goal, q_toggle, keys, draw):
+    """The answers, and the trees that led to them."""
+    begin, grow = _grown(config, q_start.shape[1])
+    query = Query(*(jnp.asarray(q) for q in (q_start, q_goal, q_toggle)), keys)
+    state, query, status = begin(query)
+    waiting = np.ones(len(q_start), bool)
+    while waiting.any():
+        state = grow(worlds, state, query, status, draw(state.state.chunk))
+        waiting = np.asarray(state.state.waiting)
+    tree = state.state.tree._replace(q=jnp.swapaxes(state.state.tree.q, 1, 2))
+    return jax.tree.map(np.asarray, (state.answers, tree))
+
+
+def assert_same_answers(a, b):
+    """The same to the last bit, whatever the batch."""
+    for name in PlanResult._fields:
         np.testing.assert_array_equal(getattr(a, name), getattr(b, name), name)
-    np.testing.assert_array_equal(a.tree.parent, b.tree.parent)
-    np.testing.assert_array_equal(a.tree.side, b.tree.side)
-    np.testing.assert_array_equal(a.tree.size, b.tree.size)
-    np.testing.assert_allclose(a.tree.q, b.tree.q, rtol=0, atol=1e-6)
-    np.testing.assert_allclose(a.path, b.path, rtol=0, atol=1e-6)
+
+
+@pytest.mark.parametrize("points", [1, 2, 3, 8, 32, 33])
+def test_stages_are_all_places_once_and_the_end_first(points):
+    groups = stages(points)
+    assert groups[0].tolist() == [1.0]
+    every = np.sort(np.concatenate(groups)) * points
+    np.testing.assert_allclose(every, np.arange(1, points + 1), rtol=1e-6)
+
+
+@pytest.mark.parametrize("rows", [4, 64])
+def test_staged_checks_give_the_verdicts_of_all_checks(rows):
+    worlds, q0, _, _ = problems(60, d=3, seed=11)
+    rng = np.random.default_rng(0)
+    q1 = (q0 + rng.normal(size=q0.shape) * 0.4).astype(np.float32)
+    problem, asked = rng.integers(0, 60, 60), rng.random(60) < 0.8
+
+    on_device = jax.tree.map(jnp.asarray, worlds)
+
+    def free(problem, q):
+        return config_free(on_device, problem, q)
+
+    def check(q0, q1):
+        return motions_free(
+            free, jnp.asarray(problem), q0, q1, jnp.asarray(asked), 10, rows
+        )
+
+    verdicts, checks = (np.asarray(x) for x in jax.jit(check)(q0, q1))
+    expected = asked & points_free(worlds, problem, q0, q1, 10)
+    np.testing.assert_array_equal(verdicts, expected)
+    assert 10 < expected.sum() < asked.sum() - 5
+    assert np.all(checks[verdicts] == 10)
+    assert np.all(checks[asked & ~verdicts] <= 10)
+    assert np.all(checks[~asked] == 0)
+
+    counts = rng.integers(0, 20, 60).astype(np.int32)
+    dense = jax.jit(
+        lambda q0, q1: all_free(
+            free, jnp.asarray(problem), q0, q1, jnp.asarray(counts), rows
+        )
+    )
+    each = [
+        count == 0
+        or points_free(worlds, problem[[i]], q0[[i]], q1[[i]], count).all()
+        for i, count in enumerate(counts)
+    ]
+    np.testing.assert_array_equal(dense(q0, q1), each)
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_any_number_of_proposals_gives_the_tree_of_one(method):
-    """200 problems: checking 16 motions at a time changes nothing but the speed."""
-    worlds, q_start, q_goal, keys = problems(200, seed=1)
-    draw = noisy_sampler(q_start, q_goal, keys)
-    config = PlannerConfig(method=method, max_expansions=120)
-    args = (worlds, q_start, q_goal, q_goal, keys, draw)
-    one = planner(replace(config, proposals=1))(*args)
-    many = planner(replace(config, check_rows=200 * 16))(*args)
-    assert_same_search(one, many)
-    # with room for fewer rows each problem has fewer proposals, the last ones more
-    assert_same_search(one, planner(config)(*args))
-    rejected = np.asarray(one.expansions - one.accepted)
-    assert np.sum(one.status == Status.SOLVED) > 5
-    assert np.sum(rejected > 2) > 100
+def test_any_number_of_lanes_gives_the_same_answers(method):
+    """100 problems that queue for 3 lanes, or for 32, or have one each."""
+    worlds, q_start, q_goal, keys = problems(100, seed=1)
+    args = (worlds, q_start, q_goal, q_goal, keys)
+    config = settings_of(method=method, max_expansions=120, workers=4)
+    few, some, all_ = (planner(replace(config, lanes=n))(*args) for n in (3, 32, 100))
+    assert_same_answers(few, some)
+    assert_same_answers(some, all_)
+    assert 0 < np.sum(few.status == Status.SOLVED) < 100
+
+
+def test_workers_need_fewer_rounds():
+    worlds, q_start, q_goal, keys = problems(50, seed=10)
+    args = (worlds, q_start, q_goal, q_goal, keys)
+    config = settings_of(max_expansions=2000)
+    one, many = (planner(replace(config, workers=k))(*args) for k in (1, 8))
+    assert np.all(one.status == Status.SOLVED)
+    assert np.all(many.status == Status.SOLVED)
+    assert np.median(many.expansions) / 8 < np.median(one.expansions)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_paths_are_checked_densely(method):
+    """With edges checked at their ends only, every path that is returned is sound all the same."""
+    worlds, q_start, q_goal, keys = problems(50, d=3, spheres=30, seed=12)
+    config = settings_of(
+        method=method, max_expansions=3000, edge_resolution=0.2, workers=4
+    )
+    args = (worlds, q_start, q_goal, q_goal, keys)
+    loose = planner(config, d=3)(*args)
+    strict = planner(replace(config, path_resolution=0.01), d=3)(*args)
+
+    def unsound(result):
+        count = 0
+        for p in np.flatnonzero(result.status == Status.SOLVED):
+            path = np.asarray(result.path[p, : result.path_length[p]])
+            shrunk = worlds._replace(radius=worlds.radius - 1e-5)
+            problem = np.full(len(path) - 1, p)
+            count += not points_free(shrunk, problem, path[:-1], path[1:], 20).all()
+        return count
+
+    assert unsound(loose) > 0
+    assert unsound(strict) == 0
+    assert np.sum(strict.status == Status.SOLVED) > 40
 
 
 ORACLE_CONFIGS = {
-    "rrt": PlannerConfig(method="rrt"),
+    "rrt": settings_of(method="rrt"),
     "rrt, literal": LITERAL,
-    "rrt, other settings": PlannerConfig(
+    "rrt, other settings": settings_of(
         method="rrt",
         metric=(1, 1, 0.9, 0.9, 0.6, 0.5, 0.3),
         toggle_tie_break=0.1,
         goal_tolerance=0.2,
     ),
-    "rrt_connect": PlannerConfig(),
-    "rrt_connect, other settings": PlannerConfig(
+    "rrt_connect": settings_of(),
+    "rrt_connect, other settings": settings_of(
         uniform_mode="independent",
         goal_tree="uniform",
         toggle_tie_break=0.2,
@@ -90,8 +203,9 @@ def test_batched_search_is_the_sequential_one(config):
     worlds, q_start, q_goal, keys = problems(count, seed=2)
     q_toggle = q_goal + 0.3
     draw = noisy_sampler(q_start, q_goal, keys)
-    result = planner(config)(worlds, q_start, q_goal, q_toggle, keys, draw)
-    result = jax.tree.map(np.asarray, result)
+    result, tree = searched_trees(
+        config, worlds, q_start, q_goal, q_toggle, keys, draw
+    )
     chunks = [draw(jnp.full(count, c)) for c in range(100 // 8 + 1)]
     for p in range(count):
         segments = Segment(
@@ -107,53 +221,49 @@ def test_batched_search_is_the_sequential_one(config):
         assert (result.status[p] == Status.SOLVED) == solved
         assert result.expansions[p] == len(oracle.flags)
         assert result.learned[p] == oracle.used
-        assert result.tree.size[p] == size
-        np.testing.assert_array_equal(result.tree.parent[p, :size], oracle.parent)
-        np.testing.assert_array_equal(result.tree.side[p, :size], oracle.side)
-        flags = result.flags[p, : len(oracle.flags)]
-        np.testing.assert_array_equal(flags, oracle.flags)
-        np.testing.assert_allclose(result.tree.q[p, :size], oracle.q, atol=1e-5)
+        assert result.accepted[p] == sum(oracle.flags)
+        assert tree.size[p] == size
+        np.testing.assert_array_equal(tree.parent[p, :size], oracle.parent)
+        np.testing.assert_array_equal(tree.side[p, :size], oracle.side)
+        np.testing.assert_allclose(tree.q[p, :size], oracle.q, atol=1e-5)
 
 
 @pytest.fixture(scope="module", params=METHODS)
 def searched(request):
-    """A planner of 32 lanes in the plane, with many obstacles."""
-    config = PlannerConfig(method=request.param, max_expansions=200, proposals=8)
-    return config, planner(config, d=2)
+    """A search in the plane, with many obstacles."""
+    return settings_of(method=request.param, max_expansions=200, workers=8)
 
 
 @given(seed=st.integers(0, 10_000))
 @settings(max_examples=8)
 def test_every_result_is_a_tree_and_a_free_path(searched, seed):
     """Parents precede children, edges are free and short, the path runs start to end."""
-    config, plan = searched
+    config = searched
     worlds, q_start, q_goal, keys = problems(32, d=2, spheres=6, seed=seed)
     draw = noisy_sampler(q_start, q_goal, keys)
-    result = plan(worlds, q_start, q_goal, q_goal, keys, draw)
-    result = jax.tree.map(np.asarray, result)
-    assert np.all(np.isfinite(result.tree.q))
-    assert np.all(np.abs(result.tree.q) <= Q_MAX)
+    result, tree = searched_trees(config, worlds, q_start, q_goal, q_goal, keys, draw)
+    assert np.all(np.isfinite(tree.q))
+    assert np.all(np.abs(tree.q) <= Q_MAX)
     assert np.all(result.expansions <= config.max_expansions)
-    assert np.all(result.accepted == np.sum(result.flags, axis=1))
     for p in range(32):
-        size = result.tree.size[p]
-        q, parent = result.tree.q[p, :size], result.tree.parent[p, :size]
+        size = tree.size[p]
+        q, parent = tree.q[p, :size], tree.parent[p, :size]
         assert np.all(parent < np.arange(size))
         edges = np.flatnonzero(parent >= 0)
         assert len(edges) == result.accepted[p]
-        assert_free(worlds, p, q[parent[edges]], q[edges], config.step_max)
+        assert_free(worlds, p, q[parent[edges]], q[edges], config)
         if result.status[p] > Status.BUDGET_EXHAUSTED:
             assert result.path_length[p] == 0
             continue
         length = result.path_length[p]
         path, rest = np.split(result.path[p], [length])
-        assert_free(worlds, p, path[:-1], path[1:], config.step_max)
+        assert_free(worlds, p, path[:-1], path[1:], config)
         np.testing.assert_array_equal(path[0], q_start[p])
         assert np.all(rest == path[-1])
         gap = np.linalg.norm(path[-1] - q_goal[p])
         if result.status[p] == Status.BUDGET_EXHAUSTED:
-            tree = q[result.tree.side[p, :size] == 0]
-            reached = np.linalg.norm(tree - q_goal[p], axis=-1)
+            nodes = q[tree.side[p, :size] == 0]
+            reached = np.linalg.norm(nodes - q_goal[p], axis=-1)
             assert gap == pytest.approx(reached.min())
         elif config.method == "rrt_connect":
             np.testing.assert_array_equal(path[-1], q_goal[p])
@@ -161,19 +271,25 @@ def test_every_result_is_a_tree_and_a_free_path(searched, seed):
             assert gap <= config.goal_tolerance
 
 
-def assert_free(worlds, problem, q0, q1, step_max):
-    """Motions of problem `problem` are free and no longer than a step."""
+def assert_free(worlds, problem, q0, q1, config):
+    """Motions of a problem are free where a planner looks, and no longer than a step."""
     # room for the rounding of a verdict that was computed by another program
     worlds = worlds._replace(radius=worlds.radius - 1e-5)
-    assert np.all(motion_free(worlds, np.full(len(q0), problem), q0, q1))
-    assert np.all(np.linalg.norm(q1 - q0, axis=-1) <= step_max * 1.001)
+    points = points_for(config.step_max, config.edge_resolution)
+    # both ways: edges of the goal's tree were checked from their other end
+    there, back = (
+        points_free(worlds, np.full(len(q0), problem), *ends, points)
+        for ends in ((q0, q1), (q1, q0))
+    )
+    assert np.all(there | back)
+    assert np.all(np.linalg.norm(q1 - q0, axis=-1) <= config.step_max * 1.001)
 
 
 @pytest.mark.parametrize("method", METHODS)
 def test_results_do_not_depend_on_the_batch(method):
     """A problem has the same answer alone, in company, elsewhere in it, and padded."""
     worlds, q_start, q_goal, keys = problems(12, seed=3)
-    plan = planner(PlannerConfig(method=method, max_expansions=60, proposals=8))
+    plan = planner(settings_of(method=method, max_expansions=60, workers=2))
 
     def run(lanes, active=None):
         lanes = np.asarray(lanes)
@@ -185,20 +301,20 @@ def test_results_do_not_depend_on_the_batch(method):
         return jax.tree.map(lambda x: np.asarray(x)[np.asarray(lanes)], result)
 
     whole = run(range(12))
-    assert_same_search(lanes_of(whole, [5]), run([5]))
+    assert_same_answers(lanes_of(whole, [5]), run([5]))
     order = np.random.default_rng(0).permutation(12)
-    assert_same_search(lanes_of(whole, order), run(order))
+    assert_same_answers(lanes_of(whole, order), run(order))
     active = np.arange(12) < 4
     padded = run(range(12), active)
-    assert_same_search(lanes_of(whole, range(4)), lanes_of(padded, range(4)))
+    assert_same_answers(lanes_of(whole, range(4)), lanes_of(padded, range(4)))
     assert np.all(padded.status[4:] == Status.INACTIVE)
     assert np.all(padded.expansions[4:] == 0)
     assert np.all(padded.path_length[4:] == 0)
 
 
 def small(method: Literal["rrt", "rrt_connect"] = "rrt_connect"):
-    """One planner for the tests that need nothing special: 16 lanes, 60 expansions."""
-    return planner(PlannerConfig(method=method, max_expansions=60, proposals=8))
+    """One planner for the tests that need nothing special."""
+    return planner(settings_of(method=method, max_expansions=60))
 
 
 def test_p_uniform_1_is_plain_rrt():
@@ -208,9 +324,9 @@ def test_p_uniform_1_is_plain_rrt():
     def never(chunk):
         raise AssertionError("asked")
 
-    plan = planner(PlannerConfig(max_expansions=60, proposals=8, p_uniform=1.0))
+    plan = planner(settings_of(max_expansions=60, p_uniform=1.0))
     uniform = plan(worlds, q_start, q_goal, q_goal, keys, never)
-    assert_same_search(uniform, small()(worlds, q_start, q_goal, q_goal, keys))
+    assert_same_answers(uniform, small()(worlds, q_start, q_goal, q_goal, keys))
     assert np.all(uniform.learned == 0)
 
 
@@ -241,10 +357,10 @@ def test_no_sampler_can_spoil_completeness(sampler):
     direction, length = sampler(q_start, q_goal)
     direction = np.broadcast_to(direction[:, None], (100, 32, 7))
     bank = Segment(jnp.asarray(direction), jnp.full((100, 32), length))
-    plan = planner(PlannerConfig(max_expansions=2000, p_uniform=0.2, proposals=8))
+    plan = planner(settings_of(max_expansions=2000, workers=8))
     result = plan(worlds, q_start, q_goal, q_goal, keys, lambda chunk: bank)
     assert np.all(result.status == Status.SOLVED), np.bincount(result.status)
-    assert np.all(np.isfinite(result.tree.q))
+    assert np.all(np.isfinite(result.path))
 
 
 def test_a_broken_sampler_leaves_plain_rrt():
@@ -254,7 +370,7 @@ def test_a_broken_sampler_leaves_plain_rrt():
     plan = small()
     broken = plan(worlds, q_start, q_goal, q_goal, keys, lambda chunk: bank)
     plain = plan(worlds, q_start, q_goal, q_goal, keys)
-    np.testing.assert_array_equal(broken.tree.parent, plain.tree.parent)
+    np.testing.assert_array_equal(broken.path, plain.path)
     np.testing.assert_array_equal(broken.expansions, plain.expansions)
 
 
@@ -316,13 +432,13 @@ def test_compiles_once():
     """New worlds, problems, banks and padding run the program that is there."""
     traces = []
 
-    def counted(worlds, problem, q0, q1):
+    def counted(worlds, problem, q):
         traces.append(None)
-        return motion_free(worlds, problem, q0, q1)
+        return config_free(worlds, problem, q)
 
     limit = np.full(7, Q_MAX)
-    config = PlannerConfig(max_expansions=60, proposals=4)
-    plan = make_planner(counted, config_free, config, -limit, limit)
+    config = settings_of(max_expansions=60)
+    plan = make_planner(counted, config, -limit, limit)
     for seed in range(4):
         worlds, q_start, q_goal, keys = problems(6, seed=seed)
         draw = noisy_sampler(q_start, q_goal, keys, rows=2)
@@ -337,7 +453,7 @@ def test_compiles_once():
     ("settings", "message"),
     [
         ({"method": "prm"}, "'prm'"),
-        ({"proposals": 0}, "proposals 0"),
+        ({"workers": 0}, "workers 0"),
         ({"p_uniform": 1.5}, "p_uniform 1.5"),
         ({"goal_tolerance": float("nan")}, "goal_tolerance nan"),
         ({"step_min": 0.3}, "0.3, 0.2"),
@@ -347,12 +463,12 @@ def test_compiles_once():
 )
 def test_refuses_settings_that_make_no_sense(settings, message):
     with pytest.raises(ValueError, match=message):
-        planner(PlannerConfig(**settings))
+        planner(settings_of(**settings))
 
 
 def test_refuses_arrays_of_the_wrong_shape():
     worlds, q_start, q_goal, keys = problems(3)
-    plan = planner(PlannerConfig())
+    plan = planner(PAPER_PLANNER)
     with pytest.raises(ValueError, match=r"q_goal has shape \(3, 6\)"):
         plan(worlds, q_start, q_goal[:, :6], q_goal, keys)
     with pytest.raises(ValueError, match="lengths"):
