@@ -17,7 +17,8 @@ class PlannerConfig:
     The defaults are for planning as such; `PAPER_PLANNER` has the paper's numbers.
     """
 
-    method: Literal["rrt", "rrt_connect"] = "rrt_connect"
+    method: Literal["rrt", "rrt_connect", "ao_rrt_connect"] = "rrt_connect"
+    """`ao_rrt_connect` uses all of `max_expansions` to find ever shorter paths."""
     max_expansions: int = 20_000
     """N_rrt: proposals whose motion is checked, each connect step included."""
     p_uniform: float = 0.2

@@ -66,7 +66,8 @@ def _grown(config, d):
 def searched_trees(config, worlds, q_start, q_goal, q_toggle, keys, draw):
     """The answers, and the trees that led to them."""
     begin, grow = _grown(config, q_start.shape[1])
-    query = Query(*(jnp.asarray(q) for q in (q_start, q_goal, q_toggle)), keys)
+    ends = (jnp.asarray(q) for q in (q_start, q_goal, q_toggle))
+    query = Query(*ends, keys, jnp.full(len(keys), jnp.inf))
     state, query, status = begin(query)
     waiting = np.ones(len(q_start), bool)
     while waiting.any():
@@ -122,8 +123,7 @@ def test_staged_checks_give_the_verdicts_of_all_checks(rows):
         )
     )
     each = [
-        count == 0
-        or points_free(worlds, problem[[i]], q0[[i]], q1[[i]], count).all()
+        count == 0 or points_free(worlds, problem[[i]], q0[[i]], q1[[i]], count).all()
         for i, count in enumerate(counts)
     ]
     np.testing.assert_array_equal(dense(q0, q1), each)
@@ -176,6 +176,52 @@ def test_paths_are_checked_densely(method):
     assert np.sum(strict.status == Status.SOLVED) > 40
 
 
+def test_ao_rrt_connect_tends_to_the_shortest_path():
+    """Around one ball the shortest path is known: two tangents and an arc."""
+    count, radius, reach = 16, 0.5, 1.0
+    worlds = Spheres(
+        np.zeros((count, 1, 3), np.float32), np.full((count, 1), radius, np.float32)
+    )
+    q_start = np.tile(np.float32([-reach, 0, 0]), (count, 1))
+    keys = jax.vmap(jax.random.key)(jnp.arange(count))
+    tangent = np.sqrt(reach**2 - radius**2)
+    arc = np.pi - 2 * np.arccos(radius / reach)
+    shortest = 2 * tangent + radius * arc
+
+    def lengths(budget):
+        config = settings_of(
+            method="ao_rrt_connect",
+            max_expansions=budget,
+            path_resolution=0.01,
+            workers=4,
+        )
+        result = planner(config, d=3)(worlds, q_start, -q_start, q_start, keys)
+        assert np.all(result.status == Status.SOLVED)
+        paths = [
+            np.asarray(path[:length])
+            for path, length in zip(result.path, result.path_length, strict=True)
+        ]
+        for path in paths:
+            np.testing.assert_array_equal(path[[0, -1]], [q_start[0], -q_start[0]])
+        steps = (np.linalg.norm(np.diff(path, axis=0), axis=1) for path in paths)
+        return np.array([step.sum() for step in steps])
+
+    early, late = lengths(400), lengths(8000)
+    assert np.all(late <= early)
+    assert np.all(late > 0.99 * shortest)
+    assert np.median(late) < 1.05 * shortest
+    assert np.median(late - shortest) < 0.5 * np.median(early - shortest)
+
+
+def test_ao_rrt_connect_stops_at_a_straight_path():
+    worlds, q_start, q_goal, keys = problems(16, seed=7)
+    worlds = worlds._replace(radius=np.zeros_like(worlds.radius))
+    config = settings_of(method="ao_rrt_connect", max_expansions=400)
+    result = planner(config)(worlds, q_start, q_goal, q_goal, keys)
+    assert np.all(result.status == Status.SOLVED)
+    assert np.all(result.expansions < 50)
+
+
 ORACLE_CONFIGS = {
     "rrt": settings_of(method="rrt"),
     "rrt, literal": LITERAL,
@@ -203,9 +249,7 @@ def test_batched_search_is_the_sequential_one(config):
     worlds, q_start, q_goal, keys = problems(count, seed=2)
     q_toggle = q_goal + 0.3
     draw = noisy_sampler(q_start, q_goal, keys)
-    result, tree = searched_trees(
-        config, worlds, q_start, q_goal, q_toggle, keys, draw
-    )
+    result, tree = searched_trees(config, worlds, q_start, q_goal, q_toggle, keys, draw)
     chunks = [draw(jnp.full(count, c)) for c in range(100 // 8 + 1)]
     for p in range(count):
         segments = Segment(

@@ -8,7 +8,8 @@ hardest; here every lane is busy until the queue is empty, in one compiled loop:
     round     every lane goes on with its problem (`search.advance`)
 
 A path whose dense check fails is not an answer: its problem starts anew in its lane, with
-other random numbers and what is left of its budget.
+other random numbers and what is left of its budget. So does, under a bound, a problem that
+is to have a shorter path (`bounded`).
 """
 
 from typing import NamedTuple
@@ -22,6 +23,10 @@ from jaxplan.planning.edges import ConfigFree, all_free
 from jaxplan.planning.result import PlanResult, Status
 from jaxplan.planning.segment import Limits, Segment
 from jaxplan.planning.state import Query, State, searching
+
+
+SHORTER = 0.999
+"""A search for a shorter path looks for one that is shorter by this factor at least."""
 
 
 class Lanes(NamedTuple):
@@ -148,20 +153,25 @@ def _harvest(
         status=jnp.where(sound, found.status, Status.BUDGET_EXHAUSTED),
         path_length=jnp.where(sound, found.path_length, 1),
     )
-    anew = ~sound & (state.expansions < config.max_expansions)
+    more = state.expansions < config.max_expansions
+    anew, bound = ~sound & more, state.query.bound
+    if search.optimises(config):
+        # Until the budget is used, or the path is straight.
+        gaps = jnp.linalg.norm(found.path[:, 1:] - found.path[:, :-1], axis=-1)
+        bound = jnp.where(solved & sound, SHORTER * jnp.sum(gaps, axis=1), bound)
+        straight = jnp.linalg.norm(state.query.q_goal - state.query.q_start, axis=-1)
+        anew |= solved & more & (bound > straight)
     done = due & ~lanes.fresh & ~anew
-    row = jnp.where(done, lanes.problem, problems)
-    answers = PlanResult(
-        *(
-            all_.at[row].set(one, mode="drop")
-            for all_, one in zip(lanes.answers, found, strict=True)
-        )
+    answers = _write(
+        lanes, found, done, due & ~lanes.fresh & sound & solved, problems, config
     )
     problem = lanes.taken + jnp.cumsum(done, dtype=jnp.int32) - 1
     problem = jnp.where(done, jnp.minimum(problem, problems), lanes.problem)
     loaded = done & (problem < problems)
     begins = loaded | anew
-    state = search.start(state, begins, *_load(query, status, problem), config)
+    asked, known = _load(query, status, problem)
+    asked = asked._replace(bound=jnp.where(anew, bound, jnp.inf))
+    state = search.start(state, begins, asked, known, config)
     # A new attempt goes on counting, and so draws other random numbers.
     for name in ("chunk", "used", "expansions", "accepted", "checks"):
         count = jnp.where(loaded, 0, getattr(state, name))
@@ -173,6 +183,27 @@ def _harvest(
         taken=lanes.taken + jnp.sum(done, dtype=jnp.int32),
         answers=answers,
     )
+
+
+def _write(
+    lanes: Lanes,
+    found: PlanResult,
+    done: jax.Array,
+    better: jax.Array,
+    problems: int,
+    config: PlannerConfig,
+) -> PlanResult:
+    """The answers, with those of the lanes that are `done [L]`, or have a `better [L]` path."""
+    first = jnp.isinf(lanes.state.query.bound)
+    path = better | (done & first) if search.optimises(config) else done
+    own = {"path": path, "path_length": path, "status": path}
+
+    def write(name: str) -> jax.Array:
+        row = jnp.where(own.get(name, done | path), lanes.problem, problems)
+        leaf = getattr(lanes.answers, name)
+        return leaf.at[row].set(getattr(found, name), mode="drop")
+
+    return PlanResult(*map(write, PlanResult._fields))
 
 
 def _check(

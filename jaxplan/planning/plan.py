@@ -97,10 +97,11 @@ def make_planner(
             _batch(q_goal, d, "q_goal"),
             _batch(q_toggle, d, "q_toggle"),
             keys,
+            np.full(len(keys), np.inf, np.float32),
         )
         problems = len(query.q_start)
         if {len(q) for q in query} != {problems}:
-            sizes = [len(q) for q in query]
+            sizes = [len(q) for q in query[:4]]
             raise ValueError(f"q_start, q_goal, q_toggle, keys have lengths {sizes}")
         active = np.ones(problems, bool) if active is None else np.asarray(active, bool)
         if draw is None or config.p_uniform >= 1:
@@ -141,6 +142,11 @@ def _check_settings(
         )
     if config.method not in search.METHODS:
         raise ValueError(f"method {config.method!r}, expected {sorted(search.METHODS)}")
+    if search.optimises(config):
+        if config.toggle_tie_break > 0 or config.metric is not None:
+            raise ValueError("ao_rrt_connect has no toggle_tie_break and no metric")
+        if config.uniform_mode != "toward":
+            raise ValueError("ao_rrt_connect needs uniform_mode 'toward'")
     if config.uniform_mode not in ("toward", "independent"):
         raise ValueError(f"uniform_mode {config.uniform_mode!r}: toward or independent")
     if config.goal_tree not in ("mirrored", "uniform"):
@@ -151,7 +157,12 @@ def _check_settings(
     for name in ("p_uniform", "goal_bias"):
         if not 0 <= getattr(config, name) <= 1:
             raise ValueError(f"{name} {getattr(config, name)}, expected 0 to 1")
-    for name in ("goal_tolerance", "goal_connect", "toggle_tie_break", "path_resolution"):
+    for name in (
+        "goal_tolerance",
+        "goal_connect",
+        "toggle_tie_break",
+        "path_resolution",
+    ):
         if not 0 <= getattr(config, name) < math.inf:
             raise ValueError(f"{name} {getattr(config, name)}, expected 0 or more")
     if not 0 < config.step_min <= config.step_max < math.inf:

@@ -77,5 +77,5 @@ def ends(
 ) -> tuple[jax.Array, jax.Array]:
     """The best node reached, q_reach, and no second tree to go on in; `[P]` each."""
     side = jnp.zeros_like(control.side[:, :1])
-    best = nearest(tree, side, query.q_goal[:, None], config.metric)[:, 0]
+    best = nearest(tree, side, query.q_goal[:, None], config.metric)[0][:, 0]
     return best, jnp.full_like(best, -1)

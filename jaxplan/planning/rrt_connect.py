@@ -83,9 +83,8 @@ def ends(
     tree: Tree, control: Control, query: Query, config: PlannerConfig
 ) -> tuple[jax.Array, jax.Array]:
     """`[P]` the node where the trees meet, in either tree; unsolved: the best one, and none."""
-    best = nearest(
-        tree, jnp.zeros_like(control.side[:, :1]), query.q_goal[:, None], config.metric
-    )[:, 0]
+    side = jnp.zeros_like(control.side[:, :1])
+    best = nearest(tree, side, query.q_goal[:, None], config.metric)[0][:, 0]
     first = jnp.argmax(control.solved, axis=1)[:, None]
     newest, aim, side = (
         jnp.take_along_axis(leaf, first, axis=1)[:, 0]

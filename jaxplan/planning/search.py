@@ -21,7 +21,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxplan.config import PlannerConfig
-from jaxplan.planning import rrt, rrt_connect
+from jaxplan.planning import bounded, rrt, rrt_connect
 from jaxplan.planning.edges import ConfigFree, motions_free, points_for
 from jaxplan.planning.proposal import draw_numbers
 from jaxplan.planning.result import PlanResult, Status
@@ -40,7 +40,7 @@ from jaxplan.planning.tree import (
 )
 
 T = TypeVar("T")
-METHODS = {"rrt": rrt, "rrt_connect": rrt_connect}
+METHODS = {"rrt": rrt, "rrt_connect": rrt_connect, "ao_rrt_connect": rrt_connect}
 LIMIT_SLACK = 1e-4
 """How far a start or goal may lie outside the limits [rad]: rounding, no more."""
 MAX_WAYPOINTS = 512
@@ -61,7 +61,7 @@ def examine(query: Query, limits: Limits) -> tuple[Query, jax.Array]:
     given = jnp.stack(query[:3])
     finite = jnp.all(jnp.isfinite(given), axis=(0, 2))
     middle = 0.5 * (limits[0] + limits[1])
-    query = Query(*jnp.where(finite[:, None], given, middle), query.key)
+    query = Query(*jnp.where(finite[:, None], given, middle), query.key, query.bound)
     ends = jnp.stack([query.q_start, query.q_goal])
     over = (ends < limits[0] - LIMIT_SLACK) | (ends > limits[1] + LIMIT_SLACK)
     over = jnp.any(over, axis=(0, 2))
@@ -73,7 +73,7 @@ def examine(query: Query, limits: Limits) -> tuple[Query, jax.Array]:
 def empty(problems: int, joints: int, keys: jax.Array, config: PlannerConfig) -> State:
     """A state of P problems that searches nothing; `keys [P]` of any kind."""
     q, zero = jnp.zeros((problems, joints)), jnp.zeros(problems, jnp.int32)
-    query = Query(q, q, q, keys)
+    query = Query(q, q, q, keys, jnp.zeros(problems))
     return State(
         query=query,
         tree=bare(problems, joints, config.max_expansions + 2),
@@ -150,6 +150,10 @@ def advance(
     worker = jnp.arange(config.workers, dtype=jnp.int32)
     number = state.expansions[:, None] + worker
     draw = draw_numbers(query.key, number, limits, config)
+    most = None
+    if optimises(config):
+        draw, most = bounded.informed(draw, query, control.side, limits)
+        most = jnp.where(control.connecting, jnp.inf, most)
     running = able[:, None] & (number < config.max_expansions)
     if bank is None:
         asking, segment = jnp.zeros_like(running), draw.segment
@@ -165,14 +169,20 @@ def advance(
         segment = Segment(at(bank.direction, row), at(bank.length, row))
 
     move = method.propose(control, state.tree, draw, asking, segment, query, config)
-    base = jnp.where(control.chained, control.newest, _base(state, move, config))
+    base, known = _base(state, move, most, config)
+    base = jnp.where(control.chained, control.newest, base)
     q_base = configurations(state.tree, base)
     q_new, reached = extend(q_base, move.proposal, limits)
-    moves = reached | (jnp.linalg.norm(q_new - q_base, axis=-1) > 1e-6)
+    length = jnp.linalg.norm(q_new - q_base, axis=-1)
+    cost = at(state.tree.cost, base) + length
+    moves = reached | (length > 1e-6)
+    if optimises(config):
+        moves &= known | control.chained
+        moves &= bounded.admits(cost, q_new, reached, control, state.tree, query)
 
     free, checks = _check(config_free, q_base, q_new, running & moves, config)
     slot = state.tree.size[:, None] + jnp.cumsum(free, axis=1, dtype=jnp.int32) - 1
-    tree = insert(state.tree, q_new, base, control.side, slot, free)
+    tree = insert(state.tree, q_new, base, control.side, cost, slot, free)
     outcome = Outcome(free, slot, q_base, q_new, reached)
     after = method.advance(control, outcome, query, config)
     after = jax.tree.map(lambda a, b: jnp.where(running, a, b), after, control)
@@ -195,18 +205,25 @@ def advance(
     )
 
 
-def _base(state: State, move: Move, config: PlannerConfig) -> jax.Array:
-    """SelectBase, and the tie-break toward q_toggle (section 4.3)."""
+def optimises(config: PlannerConfig) -> bool:
+    """Whether the search goes on after the first path."""
+    return config.method == "ao_rrt_connect"
+
+
+def _base(
+    state: State, move: Move, most: jax.Array | None, config: PlannerConfig
+) -> tuple[jax.Array, jax.Array]:
+    """SelectBase, and the tie-break toward q_toggle (section 4.3); whether there is a base."""
     tree, side, target = state.tree, state.control.side, move.proposal.target
     if config.toggle_tie_break <= 0:
-        return nearest(tree, side, target, config.metric)
+        return nearest(tree, side, target, config.metric, most)
     gaps = distances(tree, side, target, config.metric)
     anchor, least = first_min(gaps)
     q_toggle = jnp.broadcast_to(state.query.q_toggle[:, None], target.shape)
     to_toggle = distances(tree, side, q_toggle, config.metric)
     ties = gaps <= least[..., None] + config.toggle_tie_break
     tied, _ = first_min(jnp.where(ties, to_toggle, jnp.inf))
-    return jnp.where(move.learned, tied, anchor)
+    return jnp.where(move.learned, tied, anchor), jnp.ones_like(move.learned)
 
 
 def _check(

@@ -21,6 +21,8 @@ class Query(NamedTuple):
     """`[P, d]` where the gripper toggles; only the tie-break looks at it [rad]."""
     key: jax.Array
     """`[P]` typed keys."""
+    bound: jax.Array
+    """`[P]` a path has to be shorter than this [rad]; only `ao_rrt_connect` looks at it."""
 
 
 class Control(NamedTuple):

@@ -26,6 +26,8 @@ class Tree(NamedTuple):
     """`[P, N]` index of the parent, less than the node's own."""
     side: jax.Array
     """`[P, N]` 0 = tree of the start, 1 = tree of the goal."""
+    cost: jax.Array
+    """`[P, N]` length of the path to the node from the root of its tree [rad]."""
     size: jax.Array
     """`[P]` nodes in use, both trees together; what lies behind them means nothing."""
 
@@ -35,7 +37,8 @@ def bare(problems: int, joints: int, capacity: int) -> Tree:
     capacity = -(-capacity // BLOCK) * BLOCK
     nodes = jnp.zeros((problems, capacity), jnp.int32)
     q = jnp.zeros((problems, joints, capacity))
-    return Tree(q, nodes, nodes, jnp.zeros(problems, jnp.int32))
+    cost = jnp.zeros((problems, capacity))
+    return Tree(q, nodes, nodes, cost, jnp.zeros(problems, jnp.int32))
 
 
 def plant(tree: Tree, roots: jax.Array, where: jax.Array) -> Tree:
@@ -51,6 +54,7 @@ def plant(tree: Tree, roots: jax.Array, where: jax.Array) -> Tree:
         q=set_(tree.q, jnp.swapaxes(roots, 1, 2)),
         parent=set_(tree.parent, jnp.full((1, sides), NO_PARENT)),
         side=set_(tree.side, jnp.arange(sides)[None]),
+        cost=set_(tree.cost, jnp.zeros((1, sides))),
         size=jnp.where(where, sides, tree.size),
     )
 
@@ -62,9 +66,24 @@ def distance(q0: jax.Array, q1: jax.Array, metric: Metric) -> jax.Array:
 
 
 def nearest(
-    tree: Tree, side: jax.Array, target: jax.Array, metric: Metric
-) -> jax.Array:
-    """`[P, K]` the node of tree `side [P, K]` nearest to `target [P, K, d]`, the oldest of equals."""
+    tree: Tree,
+    side: jax.Array,
+    target: jax.Array,
+    metric: Metric,
+    most: jax.Array | None = None,
+) -> tuple[jax.Array, jax.Array]:
+    """The node of a tree that is nearest to a target, the oldest of equals.
+
+    Args:
+        tree: Search trees.
+        side: `[P, K]` in which tree to look.
+        target: `[P, K, d]` [rad].
+        metric: Diagonal of W.
+        most: `[P, K]` only nodes from which the target costs at most this are looked at.
+
+    Returns:
+        `[P, K]` the node, and `[P, K]` whether there is any.
+    """
     joints = range(target.shape[-1])
 
     def block(i: jax.Array, best: tuple[jax.Array, jax.Array]):
@@ -76,7 +95,11 @@ def nearest(
         gaps = [target[..., j, None] - q[:, None, j] for j in joints]
         used = i * BLOCK + jnp.arange(BLOCK) < tree.size[:, None, None]
         here = (sides[:, None] == side[..., None]) & used
-        gaps = jnp.where(here, _squares(gaps, metric), jnp.inf)
+        squares = _squares(gaps, metric)
+        if most is not None:
+            cost = jax.lax.dynamic_slice_in_dim(tree.cost, i * BLOCK, BLOCK, 1)
+            here &= cost[:, None] + jnp.sqrt(squares) <= most[..., None]
+        gaps = jnp.where(here, squares, jnp.inf)
         index_here, least_here = first_min(gaps)
         nearer = least_here < least
         return (
@@ -86,7 +109,8 @@ def nearest(
 
     none = jnp.full(side.shape, jnp.inf), jnp.zeros(side.shape, jnp.int32)
     blocks = (jnp.max(tree.size) + BLOCK - 1) // BLOCK
-    return jax.lax.fori_loop(0, blocks, block, none)[1]
+    least, index = jax.lax.fori_loop(0, blocks, block, none)
+    return index, jnp.isfinite(least)
 
 
 def distances(
@@ -131,6 +155,7 @@ def insert(
     q: jax.Array,
     parent: jax.Array,
     side: jax.Array,
+    cost: jax.Array,
     slot: jax.Array,
     keep: jax.Array,
 ) -> Tree:
@@ -141,6 +166,7 @@ def insert(
         q=tree.q.at[problem, :, index].set(q, mode="drop"),
         parent=tree.parent.at[problem, index].set(parent, mode="drop"),
         side=tree.side.at[problem, index].set(side, mode="drop"),
+        cost=tree.cost.at[problem, index].set(cost, mode="drop"),
         size=tree.size + jnp.sum(keep, axis=1, dtype=jnp.int32),
     )
 

@@ -1,0 +1,98 @@
+"""Paths shorter than a bound: what turns RRT-Connect into an asymptotically optimal planner.
+
+`ao_rrt_connect` finds a path, then searches anew for one that is shorter, until its budget
+is used (Hauser and Zhou, Asymptotically Optimal Planning by Feasible Kinodynamic Planning
+in a State-Cost Space, 2016; AORRTC, Wilson et al., 2025, does the same with RRT-Connect).
+A search under a bound
+
+    samples    the ellipsoid of configurations through which a shorter path may lead
+               (Gammell et al., Informed RRT*, 2014), and a cost with each
+    extends    the nearest node from which the sample costs no more than that
+    refuses    nodes through which no path within the bound leads
+
+While the bound is infinite, it is plain RRT-Connect.
+"""
+
+import jax
+import jax.numpy as jnp
+
+from jaxplan.planning.proposal import Draw
+from jaxplan.planning.segment import Limits
+from jaxplan.planning.state import Control, Query
+from jaxplan.planning.tree import Tree, at
+
+
+def informed(
+    draw: Draw, query: Query, side: jax.Array, limits: Limits
+) -> tuple[Draw, jax.Array]:
+    """The draw with its sample inside the ellipsoid, and the most that the sample may cost.
+
+    Args:
+        draw: Random numbers of `[P, K]` workers.
+        query: P problems.
+        side: `[P, K]` the tree that moves.
+        limits: `(q_min [d], q_max [d])` [rad].
+
+    Returns:
+        The draw, and `[P, K]` a cost, counted from the root of the tree that moves.
+    """
+    start, goal = query.q_start[:, None], query.q_goal[:, None]
+    d = start.shape[-1]
+    # The uniform numbers that gave q_rand are free: the ellipsoid has its own.
+    uniform = (draw.q_rand - limits[0]) / (limits[1] - limits[0])
+    ball = draw.segment.direction * uniform[..., :1] ** (1 / d)
+    gap = goal - start
+    across = jnp.linalg.norm(gap, axis=-1, keepdims=True)
+    bound = query.bound[:, None]
+    long = jnp.maximum(bound[..., None], across)
+    finite = jnp.where(jnp.isfinite(long), long, 1.0)
+    short = jnp.sqrt(jnp.maximum(finite**2 - across**2, 0))
+    axes = jnp.where(jnp.arange(d) == 0, finite, short) / 2
+    # A reflection that takes the first axis to the line between the foci.
+    first = jnp.eye(d)[0]
+    mirror = gap / jnp.maximum(across, 1e-9) - first
+    norm = jnp.maximum(jnp.sum(mirror**2, -1, keepdims=True), 1e-12)
+    local = axes * ball
+    turned = local - 2 * mirror * jnp.sum(mirror * local, -1, keepdims=True) / norm
+    inside = jnp.clip((start + goal) / 2 + turned, *limits)
+    narrow = jnp.isfinite(bound)
+    q_rand = jnp.where(narrow[..., None], inside, draw.q_rand)
+
+    own, other = _roots(query, side)
+    least = jnp.linalg.norm(q_rand - own, axis=-1)
+    room = bound - jnp.linalg.norm(q_rand - other, axis=-1) - least
+    share = uniform[..., min(1, d - 1)]
+    most = jnp.where(narrow, least + share * room, jnp.inf)
+    return draw._replace(q_rand=q_rand), most
+
+
+def admits(
+    cost: jax.Array,
+    q_new: jax.Array,
+    reached: jax.Array,
+    control: Control,
+    tree: Tree,
+    query: Query,
+) -> jax.Array:
+    """`[P, K]` whether a path within the bound may lead through new nodes.
+
+    Args:
+        cost: `[P, K]` of the nodes, from the root of their tree [rad].
+        q_new: `[P, K, d]` the nodes.
+        reached: `[P, K]` they are what their moves aimed at.
+        control: Of the workers.
+        tree: Search trees.
+        query: P problems.
+    """
+    _, other = _roots(query, control.side)
+    rest = jnp.linalg.norm(q_new - other, axis=-1)
+    meets = control.connecting & reached
+    rest = jnp.where(meets, at(tree.cost, control.aim), rest)
+    return cost + rest < query.bound[:, None]
+
+
+def _roots(query: Query, side: jax.Array) -> tuple[jax.Array, jax.Array]:
+    """`[P, K, d]` the root of the tree that moves, and that of the other."""
+    forward = (side == 0)[..., None]
+    start, goal = query.q_start[:, None], query.q_goal[:, None]
+    return jnp.where(forward, start, goal), jnp.where(forward, goal, start)
