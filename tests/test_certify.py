@@ -3,7 +3,16 @@
 import numpy as np
 import pytest
 
-from jaxplan.collision import certify, closest_pair, make_world
+from jaxplan.collision import (
+    Obstacle,
+    always_touching,
+    certify,
+    clearance,
+    clearance_mujoco,
+    closest_pair,
+    config_free,
+    make_world,
+)
 from jaxplan.scene import Scene
 from jaxplan.tasks.mug.scene import Q_HOME, build
 
@@ -67,3 +76,77 @@ def test_a_held_mug_is_carried_by_the_hand():
     assert table == "table_planning"
     assert mug.startswith("mug_sphere")
     assert depth < 0
+
+
+SILENT = """<mujoco><worldbody>
+  <geom name="post" size=".1" contype="0" conaffinity="0"/>
+  <body name="a" pos="0 0 .22"><joint name="j" type="slide" axis="0 0 1"/>
+    <geom name="g" size=".1" contype="0" conaffinity="0"/></body>
+</worldbody><contact><pair geom1="post" geom2="g"/></contact></mujoco>"""
+
+
+def test_the_oracle_sees_explicit_pairs_that_are_apart():
+    scene, q = Scene.from_mjcf(SILENT), np.array([[0.0], [-0.01], [-0.03]])
+    distances = clearance_mujoco(scene, make_world(scene), q)
+    np.testing.assert_allclose(distances, [0.02, 0.01, -0.01], atol=1e-7)
+    ours = clearance(scene, make_world(scene), q)
+    np.testing.assert_allclose(ours, distances, atol=1e-6)
+
+
+def test_a_slot_touches_a_geom_that_only_an_explicit_pair_names():
+    scene = Scene.from_mjcf(SILENT, slots={"box": 1})
+    box = Obstacle("box", (0.1, 0.1, 0.1), (0.0, 0.0, 0.52))
+    world, q = make_world(scene, obstacles=[box]), np.array([[0.09], [0.11]])
+    np.testing.assert_allclose(
+        clearance_mujoco(scene, world, q), [0.01, -0.01], atol=1e-6
+    )
+    np.testing.assert_allclose(clearance(scene, world, q), [0.01, -0.01], atol=1e-6)
+
+
+def test_contacts_that_the_model_switches_off_are_checked_all_the_same():
+    off = '<option><flag contact="disable"/></option>'
+    scene = Scene.from_mjcf(SLIDER.replace("<worldbody>", off + "<worldbody>"))
+    assert not certify(scene, make_world(scene), [[0.5]]).valid
+
+
+def test_without_pairs_everything_is_free():
+    scene = Scene.from_mjcf(SLIDER.replace("<geom", '<geom contype="0"'))
+    world, q = make_world(scene), np.array([[0.5], [np.nan]])
+    np.testing.assert_array_equal(clearance(scene, world, q), [np.inf, np.nan])
+    np.testing.assert_array_equal(config_free(scene, world, q), [True, False])
+    np.testing.assert_array_equal(clearance_mujoco(scene, world, q[:1]), [np.inf])
+    assert certify(scene, world, [[0.0], [1.0]]).valid
+
+
+def test_a_mocap_body_is_placed_by_the_world():
+    ball = '<body name="ball" mocap="true" pos="0 0 9"><geom size=".1"/></body>'
+    scene = Scene.from_mjcf(SLIDER.replace("</worldbody>", ball + "</worldbody>"))
+    assert scene.objects == scene.mocap == ("ball",)
+    q = np.array([[0.0], [0.2]])
+    for x in (0.16, 0.4):
+        world = make_world(scene, [[x, 0, 0, 1, 0, 0, 0]])
+        expected = np.abs(q[:, 0] - x) - 0.15
+        np.testing.assert_allclose(
+            clearance_mujoco(scene, world, q, reach=1.0), expected, atol=1e-6
+        )
+        np.testing.assert_allclose(clearance(scene, world, q), expected, atol=1e-6)
+    with pytest.raises(ValueError, match=r"cannot be held.*: ball"):
+        make_world(scene, held=[True])
+
+
+def test_what_always_touches_is_found():
+    scene = Scene.from_mjcf("""<mujoco><worldbody>
+      <body name="base"><geom size=".1"/><body name="a"><joint name="a"/>
+        <geom size=".01"/><body name="b" pos="0 0 .05"><joint name="b"/>
+          <geom size=".01" pos="0 0 .04"/>
+          <body name="palm" pos="0 0 .3"><geom size=".01"/>
+            <body name="left"><joint name="left" type="slide"/>
+              <geom size=".01" pos=".1 0 0"/></body>
+            <body name="right"><joint name="right" type="slide"/>
+              <geom size=".01" pos="-.1 0 0"/></body>
+      </body></body></body></body></worldbody></mujoco>""")
+    assert scene.joints == ("a", "b")
+    found = dict(always_touching(scene))
+    # A link on a base that does not move is no child of it to MuJoCo's filter.
+    assert found == {"a|base": 1.0, "b|base": 1.0, "left|right": 0.0}
+    assert list(found)[-1] == "left|right"

@@ -48,7 +48,7 @@ def certify(
     places, rows = _densify(np.asarray(path, float), resolution)
     if not np.isfinite(rows).all():
         return Certificate(False, math.nan, None, math.nan, None)
-    answers = list(_nearest(scene, _rows(world, (len(rows),)), rows, reach=0.0))
+    answers = list(_nearest(scene, world, rows, reach=0.0))
     distances = np.array([distance for distance, _ in answers])
     worst = int(distances.argmin())
     least = float(distances[worst])
@@ -72,7 +72,7 @@ def closest_pair(
         reach: Pairs farther apart than this are not looked for [m]; (None, inf) then.
     """
     rows = np.asarray(q, float)[None]
-    distance, geoms = next(_nearest(scene, _rows(world, (1,)), rows, reach))
+    distance, geoms = next(_nearest(scene, world, rows, reach))
     return _names(scene, geoms), distance
 
 
@@ -102,9 +102,13 @@ def mujoco_model(scene: Scene, reach: float = 0.0) -> mujoco.MjModel:
         getattr(model, field)[:] = np.asarray(getattr(scene.model, field))
     model.geom_sameframe[:] = mujoco.mjtSameFrame.mjSAMEFRAME_NONE
     _bound(model)
-    model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_MIDPHASE
-    model.geom_margin[:] = reach
-    model.body_margin[:] = reach
+    flags = mujoco.mjtDisableBit
+    model.opt.disableflags |= flags.mjDSBL_MIDPHASE
+    model.opt.disableflags &= ~(flags.mjDSBL_CONTACT | flags.mjDSBL_CONSTRAINT)
+    model.opt.enableflags = 0
+    for margin in (model.geom_margin, model.body_margin, model.pair_margin):
+        margin[:] = reach
+    model.geom_gap[:] = model.pair_gap[:] = 0
     return model
 
 
@@ -130,7 +134,7 @@ def _bound(model: mujoco.MjModel) -> None:
     round_ = kind["capsule"] | kind["cylinder"]
     caps = np.where(kind["capsule"], half[:, 0], 0)[round_]
     half[round_, 2], half[round_, 1] = half[round_, 1] + caps, half[round_, 0]
-    known = sum(kind[k] for k in ("sphere", "box", "ellipsoid")).astype(bool) | round_
+    known = kind["sphere"] | kind["box"] | kind["ellipsoid"] | round_
     model.geom_aabb[known] = np.concatenate([0 * half, half], -1)[known]
     bound = np.linalg.norm(half, axis=-1)
     bound = np.where(kind["capsule"], half[:, 2], bound)
@@ -146,12 +150,10 @@ def qpos_rows(scene: Scene, worlds: World, q: np.ndarray) -> np.ndarray:
         worlds: Leaves `[n, ...]`, NumPy.
         q: `[n, d]` joints.
     """
-    model = scene.mj_model
     qpos = np.tile(np.asarray(scene.model.qpos0, float), (len(q), 1))
     for names, values in ((scene.joints, q), (scene.passive, worlds.passive)):
-        columns = [int(model.joint(name).qposadr[0]) for name in names]
-        qpos[:, columns] = values
-    for index, name in enumerate(scene.objects):
+        qpos[:, scene.addresses(names)] = values
+    for index, name in enumerate(scene.objects[: _free(scene)]):
         start = object_address(scene, name)
         qpos[:, start : start + 7] = worlds.object_pose[:, index]
     return qpos
@@ -165,7 +167,7 @@ def carry(scene: Scene, data: mujoco.MjData, held: np.ndarray) -> None:
         data: After `mj_kinematics`.
         held: `[n_objects]` bool.
     """
-    hand = data.body(scene.hand)
+    hand = data.body(scene.body_id(scene.hand))
     for name in np.array(scene.objects)[held]:
         start = object_address(scene, name)
         pose = data.qpos[start : start + 7]
@@ -174,17 +176,21 @@ def carry(scene: Scene, data: mujoco.MjData, held: np.ndarray) -> None:
         )
 
 
-def _nearest(
-    scene: Scene, worlds: World, rows: np.ndarray, reach: float
-) -> Iterator[tuple[float, tuple[int, int] | None]]:
-    """Least distance of each row and its geoms.
+def contacts_of(
+    scene: Scene, world: World, rows: np.ndarray, reach: float = 0.0
+) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """All contacts that count, configuration by configuration.
 
     Args:
         scene: The scene.
-        worlds: Leaves `[n, ...]`, NumPy.
+        world: One for all, or leaves `[n, ...]`.
         rows: `[n, d]` joints.
         reach: How far pairs are looked for [m].
+
+    Yields:
+        Distances `[k]` [m] and geoms `[k, 2]`.
     """
+    worlds = _rows(world, (len(rows),))
     model = mujoco_model(scene, reach)
     data = mujoco.MjData(model)
     table = scene.group_table()
@@ -194,28 +200,41 @@ def _nearest(
         if group.held:
             silent[:, index] |= ~worlds.held[:, list(group.held)].any(-1)
     qpos = qpos_rows(scene, worlds, rows)
-    slots = worlds.slot_pose, worlds.slot_size
+    mocap = model.body_mocapid[[scene.body_id(name) for name in scene.mocap]]
+    placed = worlds.object_pose[:, _free(scene) :]
+    slots = np.asarray(worlds.slot_pose), np.asarray(worlds.slot_size)
     for i in range(len(rows)):
         if scene.slots and (i == 0 or any((x[i] != x[i - 1]).any() for x in slots)):
             fill_slots(scene, model, *(x[i] for x in slots))
         data.qpos[:] = qpos[i]
+        data.mocap_pos[mocap] = placed[i, :, :3]
+        data.mocap_quat[mocap] = placed[i, :, 3:]
         mujoco.mj_kinematics(model, data)
         if worlds.held[i].any():
             carry(scene, data, np.asarray(worlds.held[i]))
             mujoco.mj_kinematics(model, data)
         mujoco.mj_collision(model, data)
         geoms, distance = data.contact.geom, data.contact.dist
-        distance = np.where(
-            silent[i, table[geoms[:, 0], geoms[:, 1]]], np.inf, distance
-        )
-        deepest = distance.argmin() if data.ncon else -1
-        if data.ncon and np.isfinite(distance[deepest]):
-            yield (
-                float(distance[deepest]),
-                (int(geoms[deepest, 0]), int(geoms[deepest, 1])),
-            )
+        counts = ~silent[i, table[geoms[:, 0], geoms[:, 1]]]
+        yield distance[counts], geoms[counts]
+
+
+def _nearest(
+    scene: Scene, world: World, rows: np.ndarray, reach: float
+) -> Iterator[tuple[float, tuple[int, int] | None]]:
+    """Least distance of each row and its geoms; see `contacts_of`."""
+    for distance, geoms in contacts_of(scene, world, rows, reach):
+        if len(distance):
+            deepest = int(distance.argmin())
+            i, j = map(int, geoms[deepest])
+            yield float(distance[deepest]), (i, j)
         else:
             yield math.inf, None
+
+
+def _free(scene: Scene) -> int:
+    """How many of the objects have a free joint: the first ones, before mocap bodies."""
+    return len(scene.objects) - len(scene.mocap)
 
 
 def _names(scene: Scene, geoms: tuple[int, int] | None) -> tuple[str, str] | None:
@@ -225,7 +244,7 @@ def _names(scene: Scene, geoms: tuple[int, int] | None) -> tuple[str, str] | Non
 def _rows(world: World, shape: tuple[int, ...]) -> World:
     """The world's leaves as `[n, ...]` NumPy arrays, n = size of the shape."""
 
-    def one(leaf: Any, own: int) -> Any:
+    def one(leaf: Any, own: Any) -> Any:
         tail = leaf.shape[leaf.ndim - own :]
         rows = np.broadcast_to(np.asarray(leaf), (*shape, *tail))
         return rows.reshape(math.prod(shape), *tail)

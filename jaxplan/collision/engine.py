@@ -64,6 +64,8 @@ def least_scores(scene: Scene, world: World, q: jax.Array, score: Score) -> jax.
     Returns:
         `[N]`.
     """
+    if not scene.groups:
+        return jnp.full(q.shape[-1], jnp.inf)
     fronts = _fronts(scene)
     slots = {slot.geom: index for index, slot in enumerate(scene.slots)}
 

@@ -27,7 +27,7 @@ def link_poses(scene: Scene, world: World, q: jax.Array) -> jax.Array:
         world itself.
     """
     links = scene.structure.links
-    hand = scene.structure.link_of[int(scene.mj_model.body(scene.hand).id)]
+    hand = scene.structure.link_of[scene.body_id(scene.hand)]
     objects = [row for row, link in enumerate(links, 1) if link.object >= 0]
     first, last = (objects[0], objects[-1]) if objects else (len(links) + 1,) * 2
     fixed = jnp.broadcast_to(jnp.eye(3, 4)[..., None], (3, 4, q.shape[-1]))

@@ -26,15 +26,17 @@ def least_distances(scene: Scene, world: World, q: jax.Array) -> jax.Array:
     Returns:
         `[N]` [m].
     """
-    if scene.slots:
-        raise ValueError("backend 'mjx' has no slots; use 'fast'")
+    if scene.slots or scene.mocap:
+        raise ValueError("backend 'mjx' has no slots or mocap bodies; use 'fast'")
+    if not scene.groups:
+        return jnp.full(q.shape[-1], jnp.inf)
     model = mjx.put_model(scene.mj_model).replace(**scene.model._asdict())
     empty = mjx.make_data(scene.mj_model)
     groups = jnp.asarray(scene.group_table())
 
     def one(q: jax.Array, world: World) -> jax.Array:
         data = mjx.kinematics(model, empty.replace(qpos=_qpos(scene, world, q)))
-        hand = int(scene.mj_model.body(scene.hand).id)
+        hand = scene.body_id(scene.hand)
         held = _held_poses(world, data.xpos[hand], data.xquat[hand])
         moved = world._replace(object_pose=held)
         data = data.replace(qpos=_qpos(scene, moved, q))
@@ -55,11 +57,9 @@ def least_distances(scene: Scene, world: World, q: jax.Array) -> jax.Array:
 
 
 def _qpos(scene: Scene, world: World, q: jax.Array) -> jax.Array:
-    model, qpos = scene.mj_model, scene.model.qpos0
-    arm = np.array([int(model.joint(name).qposadr[0]) for name in scene.joints])
-    qpos = jnp.asarray(qpos).at[arm].set(q)
-    for i, name in enumerate(scene.passive):
-        qpos = qpos.at[int(model.joint(name).qposadr[0])].set(world.passive[i])
+    qpos = scene.model.qpos0
+    qpos = jnp.asarray(qpos).at[scene.addresses(scene.joints)].set(q)
+    qpos = qpos.at[scene.addresses(scene.passive)].set(world.passive)
     for i, name in enumerate(scene.objects):
         start = object_address(scene, name)
         qpos = qpos.at[start : start + 7].set(world.object_pose[i])

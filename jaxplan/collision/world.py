@@ -70,18 +70,19 @@ def make_world(
         obstacles: What fills the scene's slots, at most as many of a kind as there are.
 
     Raises:
-        ValueError: There is no slot of that kind left, or no such contact group.
+        ValueError: There is no slot of that kind left, or no such contact group; a mocap
+            body is held.
     """
-    reference = scene.mj_model.qpos0
-    start = [object_address(scene, name) for name in scene.objects]
     if object_pose is None:
-        object_pose = np.array([reference[a : a + 7] for a in start]).reshape(-1, 7)
+        poses = [_reference_pose(scene, name) for name in scene.objects]
+        object_pose = np.array(poses).reshape(-1, 7)
     if held is None:
         held = np.zeros(len(scene.objects), bool)
+    if scene.mocap and np.any(np.asarray(held)[..., -len(scene.mocap) :]):
+        names = ", ".join(scene.mocap)
+        raise ValueError(f"mocap bodies cannot be held, they have no free joint: {names}")
     if passive is None:
-        passive = reference[
-            [int(scene.mj_model.joint(name).qposadr[0]) for name in scene.passive]
-        ]
+        passive = scene.mj_model.qpos0[scene.addresses(scene.passive)]
     return World(
         jnp.asarray(object_pose, jnp.float32),
         jnp.asarray(held, bool),
@@ -125,4 +126,13 @@ def batch_shape(world: World, q: jax.Array | np.ndarray) -> tuple[int, ...]:
 def object_address(scene: Scene, name: str) -> int:
     """Where the object's free joint starts in qpos."""
     model = scene.mj_model
-    return int(model.jnt_qposadr[model.body(name).jntadr[0]])
+    return int(model.jnt_qposadr[model.body_jntadr[scene.body_id(name)]])
+
+
+def _reference_pose(scene: Scene, name: str) -> np.ndarray:
+    """`[7]` of a movable object, as the model has it."""
+    model, body = scene.mj_model, scene.body_id(name)
+    if name in scene.mocap:
+        return np.concatenate([model.body_pos[body], model.body_quat[body]])
+    start = object_address(scene, name)
+    return model.qpos0[start : start + 7]

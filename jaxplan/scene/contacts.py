@@ -2,8 +2,8 @@
 
 A pair of geoms is checked when
 
-    excluded or welded together or parent and child   no
     listed under <contact><pair>                      yes
+    excluded or welded together or parent and child   no
     contype of one & conaffinity of the other         yes
 
 Pairs are kept as rectangles, all geoms of one kind on one body against all of one
@@ -63,7 +63,8 @@ def find_contacts(model: mujoco.MjModel) -> tuple[Contact, ...]:
     known = {pair for contact in contacts for pair in geom_pairs(contact)}
     for i, j in zip(model.pair_geom1, model.pair_geom2, strict=True):
         a, b = (
-            Geoms(int(model.geom_bodyid[g]), kind_of(model, g), (int(g),)) for g in (i, j)
+            Geoms(int(model.geom_bodyid[g]), kind_of(model, g), (int(g),))
+            for g in (i, j)
         )
         if (int(i), int(j)) not in known and (int(j), int(i)) not in known:
             contacts.append(_ordered(a, b))

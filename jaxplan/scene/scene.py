@@ -20,15 +20,11 @@ import jax.numpy as jnp
 import mujoco
 import numpy as np
 
+from jaxplan.scene.chain import line
 from jaxplan.scene.contacts import geom_pairs
-from jaxplan.scene.structure import (
-    SLOTS,
-    Group,
-    Slot,
-    Structure,
-    known,
-    read_structure,
-)
+from jaxplan.scene.names import known
+from jaxplan.scene.source import SLOTS, compile_model
+from jaxplan.scene.structure import Group, Slot, Structure, read_structure
 
 
 class Numbers(NamedTuple):
@@ -69,28 +65,29 @@ class Scene:
 
         Args:
             source: An MJCF's path or text, an `MjSpec` or an `MjModel`.
-            joints: The arm's joints in the order of q. None: from the first hinge or
-                slide joint down the tree until it branches (where the fingers begin).
-            hand: The body that carries what is held. None: the last body before the
-                tree branches.
+            joints: The arm's joints in the order of q. None: all hinge and slide joints
+                that are not the gripper's, on the longest way down from the world. It
+                ends where the tree branches into parts with no more joints than stand
+                above (fingers), and before joints at the very end that are called
+                gripper, finger or jaw.
+            hand: The body that carries what is held. None: the last body before another
+                joint or a branch follows, from that of the last of `joints` on.
             slots: Room for obstacles that change between queries: how many of each kind
                 (sphere, capsule, cylinder, ellipsoid, box), such as `{"box": 16}`. They
                 can touch whatever can touch anything.
 
         Raises:
-            ValueError: A joint or body is not in the model, or cannot be planned for; a
-                geom that can touch the arm is a height field, a flex or an SDF.
+            FileNotFoundError: There is no such file.
+            ValueError: The file is no valid model, or a number in it is not finite; a
+                joint or body is not in it, or cannot be planned for; `joints` is None
+                and several chains are longest; a geom that can touch the arm is a height
+                field, a flex or an SDF.
         """
-        if isinstance(source, mujoco.MjModel):
-            if slots:
-                raise ValueError("slots need a path, text or MjSpec; this is an MjModel")
-            model = source
-        else:
-            spec = _spec(source)
-            _add_slots(spec, slots or {})
-            model = spec.compile()
+        slots = slots or {}
+        model = compile_model(source, slots)
         numbers = Numbers(*(jnp.asarray(getattr(model, f)) for f in Numbers._fields))
-        return cls(numbers, read_structure(model, joints, hand))
+        names = SLOTS if any(slots.values()) else None
+        return cls(numbers, read_structure(model, joints, hand, names))
 
     def replace(self, **fields: jax.Array) -> "Scene":
         """The scene with some of its `Numbers` replaced, e.g. `geom_pos`.
@@ -102,7 +99,8 @@ class Scene:
         if "geom_quat" in fields:
             turned = copy.copy(self.mj_model)
             turned.geom_quat[:] = np.asarray(fields["geom_quat"])
-            structure = read_structure(turned, self.joints, self.hand)
+            slots = SLOTS if self.slots else None
+            structure = read_structure(turned, self.joints, self.hand, slots)
         return Scene(self.model._replace(**fields), structure)
 
     @property
@@ -122,8 +120,13 @@ class Scene:
 
     @property
     def objects(self) -> tuple[str, ...]:
-        """Bodies with a free joint: `World.object_pose` places them."""
+        """Bodies with a free joint, then mocap bodies: `World.object_pose` places them."""
         return self.structure.objects
+
+    @property
+    def mocap(self) -> tuple[str, ...]:
+        """Mocap bodies, the last of the objects: they can be placed but not held."""
+        return self.structure.mocap
 
     @property
     def slots(self) -> tuple[Slot, ...]:
@@ -151,13 +154,38 @@ class Scene:
         return self._limits(1, jnp.inf)
 
     def _limits(self, side: int, unlimited: float) -> jax.Array:
-        ids = np.array([self.mj_model.joint(name).id for name in self.joints])
+        ids = np.array([self.joint_id(name) for name in self.joints])
         limited = self.mj_model.jnt_limited[ids] != 0
         return jnp.where(limited, self.model.jnt_range[ids, side], unlimited)
 
+    def joint_id(self, name: str) -> int:
+        """MuJoCo's id of a joint; joints without a name are called joint4, after theirs."""
+        names = self.structure.joint_names
+        return names.index(known(name, "joint", names))
+
+    def body_id(self, name: str) -> int:
+        """MuJoCo's id of a body; bodies without a name are called body3, after theirs."""
+        names = self.structure.body_names
+        return names.index(known(name, "body", names))
+
+    def addresses(self, joints: Iterable[str]) -> np.ndarray:
+        """`[n]` where the joints' positions (a free joint's seven) begin in qpos."""
+        ids = [self.joint_id(name) for name in joints]
+        return self.mj_model.jnt_qposadr[np.array(ids, int)]
+
+    @property
+    def arm_bodies(self) -> set[int]:
+        """Ids of the bodies on which the arm's joints are."""
+        ids = [self.joint_id(name) for name in self.joints]
+        return {int(body) for body in self.mj_model.jnt_bodyid[ids]}
+
+    def line(self, body: int) -> list[int]:
+        """Ids of the body, its parent and so on, without the world."""
+        return line(self.mj_model, body)
+
     def joint_kind(self, name: str) -> str:
         """hinge or slide."""
-        kind = self.mj_model.joint(name).type[0]
+        kind = self.mj_model.jnt_type[self.joint_id(name)]
         return "slide" if kind == mujoco.mjtJoint.mjJNT_SLIDE else "hinge"
 
     def ignored(self, names: Iterable[str]) -> np.ndarray:
@@ -201,35 +229,4 @@ class Scene:
         model = self.mj_model
         body = model.geom_bodyid[geom]
         number = geom - model.body_geomadr[body]
-        return model.geom(geom).name or f"{model.body(body).name}[{number}]"
-
-
-def _spec(source: str | PathLike | mujoco.MjSpec) -> mujoco.MjSpec:
-    """A spec of the caller's own, which may be changed."""
-    if isinstance(source, mujoco.MjSpec):
-        return source.copy()
-    if "<mujoco" in str(source):
-        return mujoco.MjSpec.from_string(str(source))
-    return mujoco.MjSpec.from_file(str(source))
-
-
-def _add_slots(spec: mujoco.MjSpec, slots: Mapping[str, int]) -> None:
-    """Adds the body `obstacles` with geoms of size 1 that can touch everything."""
-    kinds = ("sphere", "capsule", "cylinder", "ellipsoid", "box")
-    if not any(slots.values()):
-        return
-    body = spec.worldbody.add_body(name=SLOTS)
-    for kind, count in slots.items():
-        for i in range(count):
-            body.add_geom(
-                name=f"{kind}{i}",
-                type=getattr(
-                    mujoco.mjtGeom, f"mjGEOM_{known(kind, 'kind', kinds).upper()}"
-                ),
-                size=[1, 1, 1],
-                pos=[0, 0, 0],
-                contype=2**31 - 1,
-                conaffinity=2**31 - 1,
-                mass=0,
-                group=3,
-            )
+        return model.geom(geom).name or f"{self.structure.body_names[body]}[{number}]"

@@ -1,17 +1,15 @@
 """The static half of a scene: names, the kinematic tree, and what can touch what."""
 
 import dataclasses
-import difflib
 from collections.abc import Sequence
 from typing import NamedTuple
 
 import mujoco
+import numpy as np
 
+from jaxplan.scene.chain import SIMPLE_JOINTS, arm_joints, last_body, line
 from jaxplan.scene.contacts import Contact, find_contacts, kind_of
-
-SLOTS = "obstacles"
-"""The body whose geoms are slots."""
-SIMPLE_JOINTS = int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE)
+from jaxplan.scene.names import known, names_of
 
 
 class Link(NamedTuple):
@@ -55,9 +53,15 @@ class Structure:
     """What does not change when a geom moves. Compared by identity, so cheap under jit."""
 
     mj_model: mujoco.MjModel
+    body_names: tuple[str, ...]
+    """By body id; what has no name is called body3, after its id."""
+    joint_names: tuple[str, ...]
+    """By joint id; joint4 likewise."""
     joints: tuple[str, ...]
     passive: tuple[str, ...]
     objects: tuple[str, ...]
+    mocap: tuple[str, ...]
+    """The last of the objects: those without a free joint."""
     hand: str
     slots: tuple[Slot, ...]
     groups: tuple[Group, ...]
@@ -69,91 +73,97 @@ class Structure:
 
 
 def read_structure(
-    model: mujoco.MjModel, joints: Sequence[str] | None, hand: str | None
+    model: mujoco.MjModel,
+    joints: Sequence[str] | None,
+    hand: str | None,
+    slots: str | None = None,
 ) -> Structure:
     """Reads names, tree and contacts; `Scene.from_mjcf` says what None means.
+
+    Args:
+        model: The compiled model.
+        joints: The arm's.
+        hand: A body.
+        slots: The body whose geoms are slots.
 
     Raises:
         ValueError: A joint or body is not in the model, or cannot be planned for.
     """
     if model.nflex:
         raise ValueError("flexes are not supported: the model has a deformable body")
-    chain, end = _chain(model)
-    joints = chain if joints is None else tuple(joints)
+    bodies, every = names_of(model, "body"), names_of(model, "joint")
+    joints = arm_joints(model, every) if joints is None else tuple(joints)
     if not joints:
         raise ValueError("the model has no hinge or slide joint to plan for")
-    every = [model.joint(j).name for j in range(model.njnt)]
-    for name in joints:
-        if model.joint(known(name, "joint", every)).type[0] not in SIMPLE_JOINTS:
+    arm = [every.index(known(name, "joint", every)) for name in joints]
+    for name, joint in zip(joints, arm, strict=True):
+        if model.jnt_type[joint] not in SIMPLE_JOINTS:
             raise ValueError(f"joint {name!r} is neither a hinge nor a slide")
-    bodies = [model.body(b).name for b in range(model.nbody)]
-    hand = known(hand or end, "body", bodies)
+        if arm.count(joint) > 1:
+            raise ValueError(f"joint {name!r} is given twice")
+    moved = {int(body) for body in model.jnt_bodyid[arm]}
+    end = last_body(model, int(model.jnt_bodyid[arm[-1]]))
+    hand = known(bodies[end] if hand is None else hand, "body", bodies)
     passive = tuple(
         name
-        for name in every
-        if model.joint(name).type[0] in SIMPLE_JOINTS and name not in joints
+        for name, kind in zip(every, model.jnt_type, strict=True)
+        if kind in SIMPLE_JOINTS and name not in joints
     )
-    free = model.jnt_bodyid[model.jnt_type == mujoco.mjtJoint.mjJNT_FREE]
-    objects = tuple(model.body(b).name for b in free)
-    slots = tuple(
-        Slot(g, kind_of(model, g))
-        for g in range(model.ngeom)
-        if model.body(model.geom_bodyid[g]).name == SLOTS
-    )
-    groups = _groups(model, joints, objects)
-    needed = {int(model.body(hand).id)}
+    free = [
+        int(b) for b in model.jnt_bodyid[model.jnt_type == mujoco.mjtJoint.mjJNT_FREE]
+    ]
+    mocap = [int(b) for b in np.flatnonzero(model.body_mocapid >= 0)]
+    groups = _groups(model, bodies, moved, free)
+    needed = {bodies.index(hand)}
     for group in groups:
         needed |= {side.body for contact in group.contacts for side in contact}
-    needed = {a for body in needed for a in _line(model, body)}
-    links, link_of = _links(model, needed, (*joints, *passive), objects)
+    needed = {a for body in needed for a in line(model, body)}
+    variables = [every.index(name) for name in (*joints, *passive)]
+    links, link_of = _links(model, needed, every, variables, [*free, *mocap])
     return Structure(
-        model, joints, passive, objects, hand, slots, groups, links, link_of
+        mj_model=model,
+        body_names=bodies,
+        joint_names=every,
+        joints=joints,
+        passive=passive,
+        objects=tuple(bodies[b] for b in (*free, *mocap)),
+        mocap=tuple(bodies[b] for b in mocap),
+        hand=hand,
+        slots=tuple(
+            Slot(g, kind_of(model, g))
+            for g, body in enumerate(model.geom_bodyid)
+            if bodies[body] == slots
+        ),
+        groups=groups,
+        links=links,
+        link_of=link_of,
     )
-
-
-def known(name: str, kind: str, names: Sequence[str]) -> str:
-    """The name itself if it is among `names`, else a ValueError that suggests one."""
-    if name in names:
-        return name
-    near = difflib.get_close_matches(name, names, 1)
-    hint = f"did you mean {near[0]!r}?" if near else f"there are {', '.join(names)}"
-    raise ValueError(f"no {kind} {name!r}: {hint}")
-
-
-def _chain(model: mujoco.MjModel) -> tuple[tuple[str, ...], str]:
-    """Joints from the root down until the tree branches, and the last body before."""
-    jointed = [b for b in range(1, model.nbody) if _simple_joints(model, b)]
-    names: list[str] = []
-    end = 0
-    while True:
-        below = [b for b in jointed if end in [*_line(model, b)[1:], 0]]
-        heads = [b for b in below if not set(_line(model, b)[1:]) & set(below)]
-        if len(heads) != 1:
-            end = int(model.body_parentid[heads[0]]) if heads else end
-            return tuple(names), model.body(end).name
-        end = heads[0]
-        names += [model.joint(j).name for j in _simple_joints(model, end)]
 
 
 def _groups(
-    model: mujoco.MjModel, joints: tuple[str, ...], objects: tuple[str, ...]
+    model: mujoco.MjModel, names: tuple[str, ...], arm: set[int], free: list[int]
 ) -> tuple[Group, ...]:
     """Contacts by pair of bodies.
 
     A contact that q cannot change (a free object on the table) counts only while one
     of its objects is held; without an object it never counts.
+
+    Args:
+        model: The model.
+        names: Of bodies, by id.
+        arm: Bodies that the arm's joints move first.
+        free: Bodies with a free joint: objects that can be held.
     """
     named: dict[str, list[Contact]] = {}
     for contact in find_contacts(model):
-        name = "|".join(sorted(model.body(side.body).name for side in contact))
+        name = "|".join(sorted(names[side.body] for side in contact))
         named.setdefault(name, []).append(contact)
-    arm = {int(model.joint(name).bodyid[0]) for name in joints}
     groups = []
     for name, contacts in named.items():
-        lines = [_line(model, side.body) for side in contacts[0]]
-        moved = any(arm & set(line) for line in lines)
-        roots = [model.body(line[-1]).name for line in lines if line]
-        held = tuple(objects.index(root) for root in roots if root in objects)
+        lines = [line(model, side.body) for side in contacts[0]]
+        moved = any(arm & set(above) for above in lines)
+        roots = [above[-1] for above in lines if above]
+        held = tuple(free.index(root) for root in roots if root in free)
         if moved or held:
             _refuse_unsupported(model, contacts)
             groups.append(Group(name, tuple(contacts), () if moved else held))
@@ -175,43 +185,39 @@ def _refuse_unsupported(model: mujoco.MjModel, contacts: list[Contact]) -> None:
 def _links(
     model: mujoco.MjModel,
     needed: set[int],
-    variables: tuple[str, ...],
-    objects: tuple[str, ...],
+    names: tuple[str, ...],
+    variables: list[int],
+    objects: list[int],
 ) -> tuple[tuple[Link, ...], dict[int, int]]:
-    """Links of the bodies that are needed, and the row of each body."""
-    free = {int(model.body(name).id): i for i, name in enumerate(objects)}
+    """Links of the bodies that are needed, and the row of each body.
+
+    Args:
+        model: The model.
+        needed: Bodies, with all above them.
+        names: Of joints, by id.
+        variables: Ids of the arm's joints, then of the passive ones.
+        objects: Bodies of the movable objects.
+    """
+    free = {body: i for i, body in enumerate(objects)}
     rank = {b: 1 if b in free else 2 * (model.body_rootid[b] in free) for b in needed}
     links: list[Link] = []
     row = {0: 0}
     for body in sorted(needed, key=lambda b: (rank[b], b)):
         parent = row[0 if body in free else int(model.body_parentid[body])]
-        first = model.body_jntadr[body]
-        ids = range(first, first + model.body_jntnum[body])
+        first = int(model.body_jntadr[body])
+        ids = range(first, first + int(model.body_jntnum[body]))
         if body in free or not ids:
             links.append(Link(body, True, parent, -1, False, -1, free.get(body, -1)))
         for j in ids if body not in free else ():
-            name = model.joint(j).name
-            if model.jnt_type[j] not in SIMPLE_JOINTS:
-                raise ValueError(f"ball joint {name!r} is not supported")
+            if j not in variables:
+                raise ValueError(
+                    f"ball joint {names[j]!r} is not supported: the arm or something that "
+                    "it can touch hangs on it; use three hinges"
+                )
             slides = bool(model.jnt_type[j] == mujoco.mjtJoint.mjJNT_SLIDE)
             above = parent if j == first else len(links)
             links.append(
-                Link(body, j == first, above, int(j), slides, variables.index(name), -1)
+                Link(body, j == first, above, j, slides, variables.index(j), -1)
             )
         row[body] = len(links)
     return tuple(links), row
-
-
-def _simple_joints(model: mujoco.MjModel, body: int) -> list[int]:
-    first = model.body_jntadr[body]
-    ids = range(first, first + model.body_jntnum[body])
-    return [j for j in ids if model.jnt_type[j] in SIMPLE_JOINTS]
-
-
-def _line(model: mujoco.MjModel, body: int) -> list[int]:
-    """The body, its parent and so on, without the world."""
-    line = []
-    while body:
-        line.append(int(body))
-        body = model.body_parentid[body]
-    return line

@@ -1,0 +1,84 @@
+"""The arm in a kinematic tree: which joints are its own, and where its hand is."""
+
+import mujoco
+import numpy as np
+
+SIMPLE_JOINTS = int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE)
+GRIPPER = "gripper", "finger", "jaw"
+"""Words in the name of a joint that opens a hand."""
+
+
+def arm_joints(model: mujoco.MjModel, names: tuple[str, ...]) -> tuple[str, ...]:
+    """Names of the arm's joints, from the world down.
+
+    Where the tree branches, what follows is a hand if no branch has more joints than
+    stand above it; else the arm goes on in the longest branch. Joints at the very end
+    that are a gripper's by name do not belong to it.
+
+    Args:
+        model: The model.
+        names: Of its joints, by id.
+
+    Raises:
+        ValueError: Several branches are longest.
+    """
+    chains = _longest(model, 0, ())
+    if len(chains) > 1:
+        listed = "; ".join(", ".join(names[j] for j in chain) for chain in chains)
+        raise ValueError(
+            f"which joints are the arm's? Say joints=[...], for there are {listed}"
+        )
+    arm = list(chains[0])
+    if arm and not _heads(model, model.jnt_bodyid[arm[-1]]):
+        while arm and any(word in names[arm[-1]].lower() for word in GRIPPER):
+            arm.pop()
+    return tuple(names[j] for j in arm)
+
+
+def last_body(model: mujoco.MjModel, body: int) -> int:
+    """The last body below `body` before another joint or a branch; itself if all is rigid."""
+    lines = [set(line(model, model.body_parentid[h])) for h in _heads(model, body)]
+    # Ids grow down the tree: the greatest common one is the last before a branch.
+    return max(set.intersection(*lines)) if lines else body
+
+
+def simple_joints(model: mujoco.MjModel, body: int) -> list[int]:
+    """Ids of a body's hinges and slides."""
+    first = int(model.body_jntadr[body])
+    ids = range(first, first + int(model.body_jntnum[body]))
+    return [j for j in ids if model.jnt_type[j] in SIMPLE_JOINTS]
+
+
+def line(model: mujoco.MjModel, body: int) -> list[int]:
+    """The body, its parent and so on, without the world."""
+    above = []
+    while body:
+        above.append(int(body))
+        body = model.body_parentid[body]
+    return above
+
+
+def _longest(
+    model: mujoco.MjModel, body: int, above: tuple[int, ...]
+) -> list[tuple[int, ...]]:
+    """The longest chains that begin with the joints `above` and go on below the body."""
+    heads = _heads(model, body)
+    chains = [
+        chain
+        for head in heads
+        for chain in _longest(model, head, (*above, *simple_joints(model, head)))
+    ]
+    length = max(map(len, chains), default=0)
+    if not heads or (len(heads) > 1 and length <= 2 * len(above)):
+        return [above]
+    return [chain for chain in chains if len(chain) == length]
+
+
+def _heads(model: mujoco.MjModel, body: int) -> list[int]:
+    """Bodies below with a hinge or slide, and none between them and the body."""
+    children = [int(b) for b in np.flatnonzero(model.body_parentid == body) if b]
+    return [
+        head
+        for child in children
+        for head in ([child] if simple_joints(model, child) else _heads(model, child))
+    ]
