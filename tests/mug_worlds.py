@@ -28,4 +28,6 @@ def random_world(scene: Scene, rng: np.random.Generator, rows: int) -> World:
     passive = np.where(rng.random((rows, 1)) < 0.5, 0.04, 0.002) * np.ones(2)
     ignored = rng.random((rows, len(scene.groups))) < 0.02
     ignored[held] |= scene.ignored([*FINGERS, "hand|mug"])
-    return make_world(scene, pose, held[:, None], passive)._replace(ignored=ignored)
+    world = make_world(scene, pose, held[:, None], passive)._replace(ignored=ignored)
+    slots = (np.zeros((rows, 0, n)) for n in (7, 3))
+    return World(*world[:4], *slots)  # every leaf with the rows in front

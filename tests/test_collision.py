@@ -193,12 +193,6 @@ def test_every_kind_of_pair_agrees_with_mujoco():
     np.testing.assert_allclose(distance[reached], expected[reached], atol=2e-6)
 
 
-def test_a_pair_that_the_fast_backend_lacks_is_refused_by_name():
-    scene = Scene.from_mjcf(KINDS.format(upper=1))
-    with pytest.raises(ValueError, match=r"capsule/box.*mjx"):
-        clearance(scene, make_world(scene), jnp.zeros(3))
-
-
 SMALL = """
 <mujoco><worldbody>
   <geom name="wall" type="box" size=".1 .3 .2" pos=".5 0 0"/>

@@ -125,7 +125,7 @@ def sphere_cylinder(a: Shapes, b: Shapes, score: Score) -> jax.Array:
 
 def sphere_box(a: Shapes, b: Shapes, score: Score) -> jax.Array:
     """Distance to boxes whose axes agree up to order and sign: one turn serves all."""
-    frame = [[axis[i][0] for i in range(3)] for axis in b.axes]
+    frame = next(_each(b)).axes
     points = [dot(axis, a.centre) for axis in frame]
 
     def one(o: Shapes) -> jax.Array:

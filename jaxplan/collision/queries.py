@@ -6,7 +6,7 @@ from typing import Literal
 import jax
 import jax.numpy as jnp
 
-from jaxplan.collision.engine import least_scores, missing_kinds
+from jaxplan.collision.engine import least_scores
 from jaxplan.collision.mjx_backend import least_distances
 from jaxplan.collision.narrow import Score
 from jaxplan.collision.world import OWN_AXES, World, batch_shape
@@ -113,9 +113,6 @@ def _flat(
     flat = World(*(_batch_last(leaf, shape, own) for leaf, own in leaves))
     rows = _batch_last(jnp.broadcast_to(q, (*shape, q.shape[-1])), shape, 1)
     if backend == "fast":
-        if lacking := missing_kinds(scene):
-            kinds = ", ".join(sorted("/".join(pair) for pair in lacking))
-            raise ValueError(f"the fast backend has no {kinds}; use backend='mjx'")
         scores = least_scores(scene, flat, rows, score)
     else:
         scores = least_distances(scene, flat, rows) - score.margin

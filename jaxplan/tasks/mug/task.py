@@ -217,6 +217,8 @@ class MugTask:
             np.array([held]),
             data.qpos[FINGERS].clip(0, 0.04).astype(np.float32),
             self._allowed["held" if held else "free", touching],
+            np.zeros((0, 7), np.float32),
+            np.zeros((0, 3), np.float32),
         )
 
 
