@@ -3,14 +3,19 @@
 Peers come from the extra `bench`; what is not installed is reported, not raised.
 """
 
+from collections import Counter
 from collections.abc import Iterable
+from importlib.metadata import version
 from importlib.util import find_spec
 from typing import NamedTuple
 
 import mujoco
 import numpy as np
 
-from jaxplan.evaluation.motion_bench import Obstacle, obstacles_mjcf, panda_mjcf
+from jaxplan.collision import Obstacle
+from jaxplan.evaluation.motion_bench import Problem, obstacles_mjcf, panda_mjcf
+
+PACKAGES = "ompl", "pybullet", "torch"
 
 
 class Planned(NamedTuple):
@@ -45,3 +50,17 @@ def peer_model(robot: dict, obstacles: Iterable[Obstacle]) -> mujoco.MjModel:
     model = mujoco.MjModel.from_xml_string(panda_mjcf(robot, bodies))
     model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_MIDPHASE
     return model
+
+
+def slots_for(problems: Iterable[Problem]) -> dict[str, int]:
+    """Room for the obstacles of any of the problems, as `Scene.from_mjcf` takes it."""
+    slots: Counter[str] = Counter()
+    for problem in problems:
+        slots |= Counter(obstacle.kind for obstacle in problem.obstacles)
+    return dict(slots)
+
+
+def peer_versions() -> dict[str, str]:
+    """Of the peers that are installed."""
+    here = [package for package in PACKAGES if not absent(package)]
+    return {package: version(package) for package in here}

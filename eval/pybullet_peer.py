@@ -9,7 +9,7 @@ from collections.abc import Iterable
 import numpy as np
 import pybullet  # pyright: ignore[reportMissingImports]
 
-from jaxplan.evaluation.motion_bench import Obstacle
+from jaxplan.collision import Obstacle
 
 
 class PybulletChecker:
@@ -68,7 +68,8 @@ class PybulletChecker:
         return all(contact[8] > 0 for contact in contacts)
 
     def _add(self, obstacle: Obstacle) -> int:
-        kind, (x, y, z), client = obstacle.kind, obstacle.size, self._client
+        kind, client = obstacle.kind, self._client
+        x, y, z = [*obstacle.size, 0, 0][:3]
         round_size = {"radius": x, "height": 2 * y}  # a sphere's height is not read
         size = {"halfExtents": [x, y, z]} if kind == "box" else round_size
         shape = pybullet.createCollisionShape(

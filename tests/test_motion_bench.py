@@ -4,9 +4,9 @@ import mujoco
 import numpy as np
 import pytest
 
+from jaxplan.collision import Obstacle
 from jaxplan.evaluation.motion_bench import (
     HOME,
-    Obstacle,
     data_directory,
     obstacles_mjcf,
     panda_mjcf,
@@ -137,8 +137,8 @@ def test_the_straight_line_is_blocked_but_not_its_ends(robot, problem):
 def test_obstacles_have_mujocos_sizes_and_quaternions():
     """A probe at a box's corner, and one over a cylinder's cap, touch what they should."""
     quarter = [np.cos(np.pi / 4), np.sin(np.pi / 4), 0, 0]  # about x: z becomes -y
-    box = Obstacle("box", np.array([0.1, 0.2, 0.3]), np.array([1, 0, 0, *quarter]))
-    can = Obstacle("cylinder", np.array([0.05, 0.2, 0]), np.array([0, 0, 1, *quarter]))
+    box = Obstacle("box", [0.1, 0.2, 0.3], [1, 0, 0, *quarter])
+    can = Obstacle("cylinder", [0.05, 0.2], [0, 0, 1, *quarter])
     corner = [1.1, -0.3, 0.2 + 0.1]  # 0.1 above the corner
     cap = [0, 0.2 + 0.1, 1.04]  # 0.1 beyond the cap, near its rim
     probes = "".join(
@@ -162,7 +162,7 @@ def test_files_are_read_into_the_same_convention():
     """Full lengths become half lengths, xyzw becomes wxyz."""
     box_1 = read_problems(data_directory())["box"][0]
     can = next(o for o in box_1.obstacles if o.kind == "cylinder")
-    np.testing.assert_allclose(can.size, [0.03, 0.07, 0])
+    np.testing.assert_allclose(can.size, [0.03, 0.07])
     np.testing.assert_allclose(can.pose[:3], [0.5408381, 0.3580155, -0.3762264])
     np.testing.assert_allclose(can.pose[3:], [0.9972532, 0, 0, 0.0740684])
 

@@ -16,19 +16,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from jaxplan.collision import Obstacle
+
 HOME = (0, -0.785, 0, -2.356, 0, 1.571, 0.785)
 """Where the arm rests [rad]: the start of all of MotionBenchMaker's problems."""
-
-
-class Obstacle(NamedTuple):
-    """A convex body at rest."""
-
-    kind: str
-    """"box", "sphere", "cylinder" or "capsule"."""
-    size: np.ndarray
-    """`[3]` as MuJoCo has it [m]: half extents; or radius, half length; rest 0."""
-    pose: np.ndarray
-    """`[7]` position [m] and quaternion (w, x, y, z)."""
 
 
 class Problem(NamedTuple):
@@ -185,8 +176,7 @@ def _obstacle(
     xyzw: Iterable[float] = (0, 0, 0, 1),
 ) -> Obstacle:
     x, y, z, w = xyzw
-    three = np.array([*size, 0, 0][:3], float)
-    return Obstacle(kind, three, np.array([*position, w, x, y, z], float))
+    return Obstacle(kind, [*size], [*position, w, x, y, z])
 
 
 def _problem(
