@@ -1,6 +1,7 @@
 """The command `jaxplan`."""
 
 import difflib
+import os
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -8,6 +9,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 import tyro
+from tyro.conf import Positional
 
 
 @dataclass(frozen=True)
@@ -22,11 +24,58 @@ class Solve:
     """Directory with predictor, sampler and manifest; the package's own by default."""
 
 
-COMMANDS = {"solve": Solve}
+@dataclass(frozen=True)
+class Plan:
+    """Plans a motion of any MJCF's arm from one pose to another, and certifies it.
+
+    Exit code 0 with a certified motion, 1 without (the reason is printed), 2 for bad input.
+    """
+
+    scene: Positional[Path]
+    """MJCF file."""
+    start: str
+    """A key frame's name, or numbers with commas between them: a joint each [rad or m]."""
+    goal: str
+    """The same."""
+    seed: int = 0
+    """Of the search."""
+    out: Path | None = None
+    """Directory for plan.json: path, timed trajectory, versions."""
+    video: bool = False
+    """Renders the motion into plan.mp4, in --out."""
+    joints: str | None = None
+    """The arm's joints, with commas between them; by default the chain before the fingers."""
+    hand: str | None = None
+    """The arm's last body; by default the last before the fingers."""
+    velocity: float = 1.0
+    """Of each joint at most [rad/s or m/s]."""
+    acceleration: float = 2.0
+    """Of each joint at most [rad/s^2 or m/s^2]."""
+
+
+@dataclass(frozen=True)
+class Check:
+    """Says what planning sees in an MJCF, and what is close or collides in a pose.
+
+    Exit code 0 if the pose is free, 1 if it is not, 2 for bad input.
+    """
+
+    scene: Positional[Path]
+    """MJCF file."""
+    at: str | None = None
+    """A key frame's name, or numbers with commas between them: a joint each [rad or m]. By
+    default `home`, the first key frame, or the reference pose."""
+    joints: str | None = None
+    """The arm's joints, with commas between them; by default the chain before the fingers."""
+    hand: str | None = None
+    """The arm's last body; by default the last before the fingers."""
+
+
+COMMANDS = {"plan": Plan, "check": Check, "solve": Solve}
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Runs a command; 0 when done, 1 if the episode failed, 2 for bad input."""
+    """Runs a command; 0 when done, 1 if the answer is no, 2 for bad input."""
     arguments = sys.argv[1:] if arguments is None else arguments
     if arguments and not arguments[0].startswith("-") and arguments[0] not in COMMANDS:
         near = difflib.get_close_matches(arguments[0], COMMANDS, 1)
@@ -36,7 +85,7 @@ def main(arguments: list[str] | None = None) -> int:
     command = tyro.extras.subcommand_cli_from_dict(
         COMMANDS, prog="jaxplan", args=arguments
     )
-    return _guarded(lambda: _solve(command))
+    return _guarded(lambda: RUN[type(command)](command))
 
 
 def run_script(main: Callable[[Any], None], arguments: type) -> NoReturn:
@@ -61,10 +110,25 @@ def _guarded(run: Callable[[], int]) -> int:
         return _fail((str(error) or type(error).__name__).splitlines()[0])
 
 
+def _plan(command: Plan) -> int:
+    _check_seed(command.seed)
+    _keep_compiled()
+    from jaxplan.commands.plan import plan
+
+    given = vars(command).copy()
+    return 0 if plan(given.pop("scene"), **given) else 1
+
+
+def _check(command: Check) -> int:
+    from jaxplan.commands.check import check
+
+    given = vars(command).copy()
+    return 0 if check(given.pop("scene"), **given) else 1
+
+
 def _solve(command: Solve) -> int:
-    if not 0 <= command.seed < 2**31:
-        raise ValueError(f"seed {command.seed}: expected 0 to {2**31 - 1}")
-    # Here, so that `--help` and a typo answer at once.
+    _check_seed(command.seed)
+    _keep_compiled()
     from jaxplan.learning import load_pair
     from jaxplan.learning.pretrained import DIRECTORY
     from jaxplan.solve import solve
@@ -72,6 +136,28 @@ def _solve(command: Solve) -> int:
     weights = load_pair(command.weights or DIRECTORY)
     episode = solve(command.seed, weights, command.out)
     return 0 if episode["success"] else 1
+
+
+# They import when they run, so that `--help` and a typo answer at once.
+RUN = {Plan: _plan, Check: _check, Solve: _solve}
+
+
+def _check_seed(seed: int) -> None:
+    if not 0 <= seed < 2**31:
+        raise ValueError(f"seed {seed}: expected 0 to {2**31 - 1}")
+
+
+def _keep_compiled() -> None:
+    """Keeps compiled programs for the next run, where the user has not said otherwise."""
+    import jax
+
+    if not os.environ.get("JAX_COMPILATION_CACHE_DIR"):
+        home = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+        jax.config.update(
+            "jax_compilation_cache_dir", str(Path(home, "jaxplan", "jax"))
+        )
+    if not os.environ.get("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS"):
+        jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.0)
 
 
 def _fail(message: str) -> int:

@@ -4,6 +4,8 @@
     planner = jaxplan.Planner(scene)
     plan = planner.plan(q_start, q_goal)
     planner.certify(plan), planner.time(plan)
+
+Statuses say what came of a question; exceptions say that it was none.
 """
 
 import dataclasses
@@ -114,9 +116,8 @@ class Planner:
         self.scene, self.config = scene, config
         self._trajectory, self._sampler = trajectory, sampler
         d = len(scene.joints)
-        self._velocity, self._acceleration = (
-            np.broadcast_to(np.asarray(x, float), d) for x in (velocity, acceleration)
-        )
+        self._velocity = _most(velocity, d, "velocity")
+        self._acceleration = _most(acceleration, d, "acceleration")
         far = np.array([UNLIMITED[scene.joint_kind(name)] for name in scene.joints])
         self.q_min, self.q_max = (
             np.clip(np.asarray(own if given is None else given, float), -far, far)
@@ -149,8 +150,9 @@ class Planner:
         Raises:
             ValueError: An argument of the wrong shape or type.
         """
-        rows = [_rows(q, 1, self, n) for q, n in ((q_start, "q_start"), (q_goal, "q_goal"))]
-        return self._plan(*(q[None] for q in rows), [seed], world)[0]
+        start = _rows(q_start, 1, self, "q_start")[None]
+        goal = _rows(q_goal, 1, self, "q_goal")[None]
+        return self._plan(start, goal, [seed], world)[0]
 
     def plan_batch(
         self,
@@ -178,12 +180,15 @@ class Planner:
         if not len(q_starts) == len(q_goals) == len(seeds):
             sizes = f"{len(q_starts)}, {len(q_goals)} and {len(seeds)}"
             raise ValueError(f"q_starts, q_goals and seeds have {sizes} rows")
-        if worlds is not None and not isinstance(worlds, World):
-            worlds = list(worlds)
-            if len(worlds) != len(seeds):
-                raise ValueError(f"{len(worlds)} worlds for {len(seeds)} questions")
-            worlds = jax.tree.map(lambda *leaves: np.stack(leaves), *worlds)
-        return self._plan(q_starts, q_goals, seeds, worlds)
+        if worlds is None or isinstance(worlds, World):
+            return self._plan(q_starts, q_goals, seeds, worlds)
+        rows = [self._checked(world, ()) for world in worlds]
+        if len(rows) != len(seeds):
+            raise ValueError(f"{len(rows)} worlds for {len(seeds)} questions")
+        stacked = (
+            jax.tree.map(lambda *leaves: np.stack(leaves), *rows) if rows else None
+        )
+        return self._plan(q_starts, q_goals, seeds, stacked)
 
     def time(self, plan: Plan, speed: float = 1.0) -> Timed:
         """Shortens, smooths and times a path (section 4.3), and checks all of it again.
@@ -197,6 +202,8 @@ class Planner:
         """
         if not plan.solved:
             raise ValueError(f"no motion to time: {plan.reason}")
+        if not 0 < speed < np.inf:
+            raise ValueError(f"speed {speed}, expected more than 0")
         timed = make_trajectory(
             plan.path[None],
             np.array([len(plan.path)]),
@@ -206,9 +213,9 @@ class Planner:
             speed**2 * self._acceleration,
             self._trajectory,
         )
-        samples = (leaf[0, : timed.length[0]] for leaf in (timed.q, timed.qd, timed.qdd))
-        times = timed.times[: timed.length[0]]
-        return Timed(times, *samples, bool(timed.rung[0] != Rung.INVALID))
+        q, qd, qdd = (x[0, : timed.length[0]] for x in (timed.q, timed.qd, timed.qdd))
+        free = bool(timed.rung[0] != Rung.INVALID)
+        return Timed(timed.times[: timed.length[0]], q, qd, qdd, free)
 
     def certify(
         self,
@@ -251,7 +258,9 @@ class Planner:
     @cached_property
     def _free(self) -> Callable:
         margin = self.config.margin
-        return _jit(lambda world, q: collision.config_free(self.scene, world, q, margin))
+        return _jit(
+            lambda world, q: collision.config_free(self.scene, world, q, margin)
+        )
 
     def _plan(
         self,
@@ -260,14 +269,17 @@ class Planner:
         seeds: Sequence[int],
         world: World | None,
     ) -> list[Plan]:
-        """Plans for rows `[P, d]`; the world has a leading axis or none."""
+        """Plans for rows `[P, d]`; leaves of the world have a leading axis or none."""
         count = len(seeds)
+        for seed in seeds:
+            if not (isinstance(seed, int | np.integer) and 0 <= seed < 2**32):
+                raise ValueError(
+                    f"seed {seed!r}, expected an integer from 0 to 2^32 - 1"
+                )
+        world = self._checked(self.empty_world if world is None else world, (count,))
+        own = bool(world.passive.ndim > OWN_AXES.passive)
         if not count:
             return []
-        world = self.empty_world if world is None else world
-        own = world.passive.ndim > OWN_AXES.passive
-        if own and len(world.passive) != count:
-            raise ValueError(f"{len(world.passive)} worlds for {count} questions")
         began = time.perf_counter()
         parts = _parts(count)
         search = partial(self._search_rows, q_start, q_goal, seeds, world, own)
@@ -280,11 +292,13 @@ class Planner:
         plans: dict[int, Plan] = {}
         for rows, answer in zip(parts, answers, strict=True):
             for place, row in enumerate(rows):
-                here = jax.tree.map(lambda leaf, r=row: leaf[r], world) if own else world
+                here = (
+                    jax.tree.map(lambda leaf, r=row: leaf[r], world) if own else world
+                )
                 length = int(answer.path_length[place])
                 plan = Plan(
                     status=Status(int(answer.status[place])),
-                    path=answer.path[place, :length],
+                    path=np.asarray(answer.path[place, :length]),
                     expansions=int(answer.expansions[place]),
                     checks=int(answer.checks[place]),
                     time=seconds,
@@ -296,6 +310,31 @@ class Planner:
                 plans[row] = dataclasses.replace(plan, reason=reason)
         return [plans[row] for row in range(count)]
 
+    def _checked(self, world: World, batch: tuple[int, ...]) -> World:
+        """The world in NumPy; all of its leaves have leading axes `batch`, or none has any."""
+        if not isinstance(world, World):
+            raise ValueError(f"{type(world).__name__} is not a World, see make_world")
+        leaves: list[Any] = []
+        ours = self.empty_world
+        for name, leaf, own in zip(World._fields, world, ours, strict=True):
+            try:
+                leaves.append(np.asarray(leaf, own.dtype))
+            except (TypeError, ValueError, OverflowError) as error:
+                raise ValueError(f"world.{name} is not an array: {error}") from None
+            if leaves[-1].shape not in (own.shape, (*batch, *own.shape)):
+                wanted = " or ".join(
+                    sorted({str(own.shape), str((*batch, *own.shape))})
+                )
+                raise ValueError(
+                    f"world.{name} has shape {leaves[-1].shape}, expected {wanted}"
+                )
+        if (leaves[-1] < 0).any():
+            raise ValueError("world.slot_size has a negative size")
+        if all(leaf.shape == own.shape for leaf, own in zip(leaves, ours, strict=True)):
+            return World(*leaves)
+        shapes = [(*batch, *own.shape) for own in ours]
+        return World(*map(np.broadcast_to, leaves, shapes))  # type: ignore[arg-type]
+
     def _search_rows(
         self,
         q_start: np.ndarray,
@@ -306,7 +345,9 @@ class Planner:
         rows: np.ndarray,
     ) -> PlanResult:
         """Searches some of the rows, padded to a size that compiles seldom."""
-        size = len(rows) if len(rows) == 1 else max(16, 1 << (len(rows) - 1).bit_length())
+        size = (
+            len(rows) if len(rows) == 1 else max(16, 1 << (len(rows) - 1).bit_length())
+        )
         padded = np.resize(rows, size)
         active = np.arange(size) < len(rows)
         keys = _keys(np.array([seeds[row] for row in padded], np.uint32))
@@ -321,8 +362,12 @@ class Planner:
         """The compiled search; `own`: each problem has a world of its own."""
         if own not in self._searches:
 
-            def config_free(worlds: World, problem: jax.Array, q: jax.Array) -> jax.Array:
-                world = jax.tree.map(lambda leaf: leaf[problem], worlds) if own else worlds
+            def config_free(
+                worlds: World, problem: jax.Array, q: jax.Array
+            ) -> jax.Array:
+                world = (
+                    jax.tree.map(lambda leaf: leaf[problem], worlds) if own else worlds
+                )
                 return collision.config_free(self.scene, world, q, self.config.margin)
 
             self._searches[own] = make_planner(
@@ -343,7 +388,14 @@ class Planner:
             # Apart from the numbers of the search, which fold in expansions from 0 on.
             key = jax.random.fold_in(jax.random.fold_in(key, 2**31), chunk)
             assert self._sampler is not None
-            return self._sampler(key, q_start, q_goal, count)
+            segment = Segment(*self._sampler(key, q_start, q_goal, count))
+            shapes = jnp.shape(segment.direction), jnp.shape(segment.length)
+            if shapes != ((count, len(q_start)), (count,)):
+                raise ValueError(
+                    f"the sampler's direction and length have shapes {shapes[0]} and "
+                    f"{shapes[1]}, expected {(count, len(q_start))} and {(count,)}"
+                )
+            return segment
 
         return _jit(jax.vmap(bank))
 
@@ -360,14 +412,13 @@ class Planner:
             name, q = ends[plan.status == Status.GOAL_IN_COLLISION]
             return f"{name} in collision: {self._contact(plan.world, q)}"
         if plan.status == Status.OUT_OF_LIMITS:
-            for name, q in ends:
-                for j, joint in enumerate(self.scene.joints):
-                    low, high = self.q_min[j], self.q_max[j]
-                    if not low - 1e-4 <= q[j] <= high + 1e-4:
-                        return (
-                            f"{name} out of limits: joint {joint!r} at {q[j]:.4f}, "
-                            f"limits {low:.4f} to {high:.4f}"
-                        )
+            over = [np.maximum(self.q_min - q, q - self.q_max) for _, q in ends]
+            name, q = ends[int(over[1].max() > over[0].max())]
+            j = int(np.argmax(np.maximum(*over)))
+            return (
+                f"{name} out of limits: joint {self.scene.joints[j]!r} at {q[j]:.4f}, "
+                f"limits {self.q_min[j]:.4f} to {self.q_max[j]:.4f}"
+            )
         if plan.status == Status.INVALID_INPUT:
             for name, q in ends:
                 for j in np.flatnonzero(~np.isfinite(q)):
@@ -378,6 +429,9 @@ class Planner:
         """The closest pair at q, by name, and how deep it is."""
         if not all(np.isfinite(np.asarray(leaf)).all() for leaf in world):
             return "the world has values that are not finite"
+        poses = np.concatenate([world.object_pose, world.slot_pose])
+        if not poses[:, 3:].any(-1).all():
+            return "the world has a quaternion of zeros"
         pair, distance = collision.closest_pair(self.scene, world, q, 0.01)
         if pair is None:
             return "nothing within 10 mm by C MuJoCo"
@@ -405,11 +459,25 @@ def _parts(count: int) -> list[np.ndarray]:
     return [np.arange(count)[i :: max(threads, 1)] for i in range(max(threads, 1))]
 
 
+def _most(value: ArrayLike, d: int, name: str) -> np.ndarray:
+    """`[d]` limits, checked."""
+    try:
+        limits = np.broadcast_to(np.asarray(value, float), d)
+    except (TypeError, ValueError, OverflowError):
+        raise ValueError(f"{name} {value!r}, expected a number or {d}") from None
+    if not ((limits > 0) & np.isfinite(limits)).all():
+        raise ValueError(f"{name} {value}, expected more than 0")
+    return limits
+
+
 def _rows(q: ArrayLike, axes: int, planner: Planner, name: str) -> np.ndarray:
     """q as float32, checked."""
     try:
-        rows = np.asarray(q, np.float64)
-    except (TypeError, ValueError) as error:
+        rows = np.asarray(q)
+        rows = rows.astype(
+            np.float64, casting="unsafe" if rows.dtype == object else "same_kind"
+        )
+    except (TypeError, ValueError, OverflowError) as error:
         raise ValueError(f"{name} is not an array of numbers: {error}") from None
     d = len(planner.scene.joints)
     if rows.ndim != axes or rows.shape[-1] != d:

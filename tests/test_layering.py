@@ -12,15 +12,15 @@ PACKAGE = Path(jaxplan.__file__).parent
 
 # Each part may import itself and what stands in an earlier line.
 LAYERS = (
-    {"config", "pretrained"},
+    {"config", "provenance", "pretrained"},
     {"scene", "planning", "trajectory", "diffusion", "data"},
     {"collision", "networks"},
-    {"samplers", "simulation", "motion"},
+    {"samplers", "simulation", "motion", "planner"},
     {"tasks", "learning", "policies"},
     {"rollout"},
     {"agent"},
     {"evaluation"},
-    {"solve", "train", "__init__"},
+    {"commands", "solve", "train", "__init__"},
     {"cli"},
     {"__main__"},
 )
@@ -33,7 +33,7 @@ HOMES = {
     "orbax": ("learning/checkpoint.py",),
 }
 OUTSIDE = {"train", "eval", "configs", "tests"}
-PRINTING = ("cli.py", "solve.py", "train.py")
+PRINTING = ("cli.py", "commands/check.py", "commands/plan.py", "solve.py", "train.py")
 
 FILES = sorted(file.relative_to(PACKAGE).as_posix() for file in PACKAGE.rglob("*.py"))
 

@@ -46,12 +46,6 @@ class Front(NamedTuple):
     kinds: tuple[str, str]
 
 
-def missing_kinds(scene: Scene) -> set[tuple[str, str]]:
-    """Pairs of geom kinds in the scene that this backend lacks."""
-    kinds = {(c.a.kind, c.b.kind) for g in scene.groups for c in g.contacts}
-    return kinds - set(FUNCTIONS)
-
-
 def least_scores(scene: Scene, world: World, q: jax.Array, score: Score) -> jax.Array:
     """Least score over all pairs that count.
 
@@ -130,13 +124,15 @@ def _least_over_slots(
 
 
 def _fronts(scene: Scene) -> list[Front]:
-    """Contacts, put together by obstacle and then by who faces it."""
+    """Contacts, put together by obstacle and then by who faces it, slots apart."""
     facing = defaultdict(list)
+    slots = {slot.geom for slot in scene.slots}
     for index, group in enumerate(scene.groups):
         for contact in group.contacts:
-            facing[contact.b, contact.a.kind].append((contact.a, index))
+            moves = contact.a.ids[0] in slots
+            facing[contact.b, contact.a.kind, moves].append((contact.a, index))
     together = defaultdict(list)
-    for (obstacle, kind), sides in facing.items():
+    for (obstacle, kind, _), sides in facing.items():
         key = tuple(sides), obstacle.body, (kind, obstacle.kind)
         together[key].append(obstacle)
     fronts = []

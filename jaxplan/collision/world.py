@@ -11,6 +11,8 @@ import numpy.typing as npt
 from jaxplan.scene import Scene
 
 
+SIZES = {"sphere": 1, "capsule": 2, "cylinder": 2, "ellipsoid": 3, "box": 3}
+"""Numbers that give an obstacle's size."""
 FAR = (0.0, 0.0, 1000.0, 1.0, 0.0, 0.0, 0.0)
 """Where an empty slot is: out of reach of everything."""
 
@@ -107,6 +109,10 @@ def _fill(
                 f"no slot is left for a {obstacle.kind}: the scene has "
                 f"{sum(slot.kind == obstacle.kind for slot in scene.slots)} "
                 "(see `slots` of Scene.from_mjcf)"
+            )
+        if len(obstacle.pose) not in (3, 7) or len(obstacle.size) != SIZES[obstacle.kind]:
+            raise ValueError(
+                f"{obstacle}: expected {SIZES[obstacle.kind]} sizes and a pose of 3 or 7"
             )
         index = free[obstacle.kind].pop(0)
         pose[index, : len(obstacle.pose)] = obstacle.pose

@@ -7,11 +7,11 @@ from typing import Any
 
 from jaxplan.agent import Agent
 from jaxplan.config import PAPER_PLANNER, PlannerConfig, RolloutConfig, TrajectoryConfig
-from jaxplan.evaluation.provenance import versions
 from jaxplan.evaluation.statistics import wilson
 from jaxplan.evaluation.toggle_error import ToggleErrors
 from jaxplan.learning import Weights
 from jaxplan.motion import MotionPlanner
+from jaxplan.provenance import versions
 from jaxplan.rollout import EpisodeRecord, Phase, Predict, rollout
 from jaxplan.scene.panda import PANDA_LIMITS
 from jaxplan.simulation.physics import CONTROL_PERIOD

@@ -5,7 +5,7 @@ import importlib
 import os
 import sys
 import weakref
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import mujoco
@@ -54,12 +54,19 @@ class Camera:
         model: The scene.
         height: Rows [px].
         width: Columns [px].
+        groups: Of geoms that are shown.
 
     Raises:
         NoGLError: No GL library, or it cannot make a context.
     """
 
-    def __init__(self, model: mujoco.MjModel, height: int, width: int) -> None:
+    def __init__(
+        self,
+        model: mujoco.MjModel,
+        height: int,
+        width: int,
+        groups: Iterable[int] = (0, 1, 2),
+    ) -> None:
         try:
             _use_headless_gl()
             self._renderer = mujoco.Renderer(model, height, width)
@@ -71,13 +78,16 @@ class Camera:
         weakref.finalize(self, self._renderer.close)
         options = mujoco.MjvOption()
         options.geomgroup[:] = 0
-        options.geomgroup[[0, 1, 2]] = 1
+        options.geomgroup[list(groups)] = 1
         self._options = options
 
     def render(
-        self, data: mujoco.MjData, camera: str, marks: Sequence[Mark] = ()
+        self,
+        data: mujoco.MjData,
+        camera: str | int | mujoco.MjvCamera,
+        marks: Sequence[Mark] = (),
     ) -> np.ndarray:
-        """Image (height, width, 3) uint8 from a named camera, with marks drawn into the scene."""
+        """Image (height, width, 3) uint8 from a camera, with marks drawn into the scene."""
         self._renderer.update_scene(data, camera, self._options)
         scene = self._renderer.scene
         for mark in marks:

@@ -1,16 +1,15 @@
 """Pictures of an episode for people: a film strip with a panel per phase, and a video."""
 
-import warnings
 from pathlib import Path
 from typing import NamedTuple
 
-import imageio.v3 as iio
 import mujoco
 import numpy as np
 from PIL import Image, ImageDraw
 
 from jaxplan.simulation.camera import Camera, Mark
 from jaxplan.simulation.physics import CONTROL_PERIOD
+from jaxplan.simulation.video import write_video
 from jaxplan.tasks.mug import scene
 from jaxplan.tasks.mug.kinematics import InverseKinematics
 from jaxplan.tasks.mug.task import MugTask
@@ -77,12 +76,8 @@ class Film:
             panels.append(np.asarray(panel))
         panels.append(picture(self._states[-1], []))
         _strip(panels).save(directory / "phases.png")
-        frames = np.stack([picture(qpos, []) for qpos in self._states])
-        video, fps = directory / "episode.mp4", round(VIDEO_FPS)
-        with warnings.catch_warnings():
-            # JAX warns of forks; this one becomes ffmpeg at once.
-            warnings.filterwarnings("ignore", "os.fork", RuntimeWarning)
-            iio.imwrite(video, frames, fps=fps, macro_block_size=1)
+        frames = (picture(qpos, []) for qpos in self._states)
+        write_video(directory / "episode.mp4", frames, round(VIDEO_FPS))
 
     def _record(self, episode: int, data: mujoco.MjData) -> None:
         self._ticks += 1

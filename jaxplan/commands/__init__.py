@@ -1,0 +1,1 @@
+"""The commands for any model: `jaxplan plan` and `jaxplan check`."""

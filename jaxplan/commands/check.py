@@ -1,0 +1,109 @@
+"""`jaxplan check`: what planning sees in a model, and what touches in a pose."""
+
+from collections import Counter
+from pathlib import Path
+
+import numpy as np
+
+from jaxplan.collision import always_touching, closest_pair
+from jaxplan.commands.model import Pose, default_pose, read_pose, read_scene, world_at
+from jaxplan.scene import Scene
+from jaxplan.scene.contacts import kind_of
+
+REACH = 0.5
+"""How far C MuJoCo looks for what is closest [m]."""
+SHOWN = 5
+"""Pairs of bodies that are listed, besides those that collide."""
+
+
+def check(
+    path: Path,
+    at: str | None = None,
+    joints: str | None = None,
+    hand: str | None = None,
+) -> bool:
+    """Says what is found in a model.
+
+    Args:
+        path: Of the MJCF.
+        at: Key frame or numbers; None: `home`, the first key frame or the reference pose.
+        joints: See `read_scene`.
+        hand: See `read_scene`.
+
+    Returns:
+        Whether the pose is free and within limits.
+
+    Raises:
+        ValueError: Bad input.
+    """
+    scene = read_scene(path, joints, hand)
+    pose = default_pose(scene) if at is None else read_pose(scene, at, "at")
+    _show_scene(path, scene)
+    inside = _show_limits(scene, pose)
+    free = _show_contacts(scene, pose)
+    _suggest_excludes(scene)
+    return inside and free
+
+
+def _show_scene(path: Path, scene: Scene) -> None:
+    print(f"{path}: {len(scene.joints)} joints, hand {scene.hand!r}")
+    for name, low, high in zip(scene.joints, scene.q_min, scene.q_max, strict=True):
+        kind = scene.joint_kind(name)
+        unit = "rad" if kind == "hinge" else "m"
+        limits = f"{low:.4f} to {high:.4f} {unit}" if np.isfinite(low) else "no limits"
+        print(f"  {name}: {kind}, {limits}")
+    for title, names in (("other joints", scene.passive), ("objects", scene.objects)):
+        if names:
+            print(f"{title}: {', '.join(names)}")
+    model = scene.mj_model
+    touching = {
+        geom
+        for group in scene.groups
+        for contact in group.contacts
+        for side in contact
+        for geom in side.ids
+    }
+    kinds = Counter((g in touching, kind_of(model, g)) for g in range(model.ngeom))
+    for can, title in ((True, "geoms that can touch"), (False, "geoms left out")):
+        counts = [f"{n} {kind}" for (c, kind), n in sorted(kinds.items()) if c == can]
+        print(f"{title}: {', '.join(counts) or 'none'}")
+    print(f"pairs: {len(scene.pairs)} of geoms, {len(scene.groups)} of bodies")
+
+
+def _show_limits(scene: Scene, pose: Pose) -> bool:
+    """Says which joints are out of their limits; whether none is."""
+    over = (pose.q < np.asarray(scene.q_min)) | (pose.q > np.asarray(scene.q_max))
+    for joint in np.flatnonzero(over):
+        print(f"out of limits: {scene.joints[joint]} at {pose.q[joint]:.4f}")
+    return not over.any()
+
+
+def _show_contacts(scene: Scene, pose: Pose) -> bool:
+    """Lists the closest geoms of each pair of bodies, by C MuJoCo; whether none collide."""
+    group_of = {frozenset(pair): group for group, *pair in scene.pairs}
+    world, nearest = world_at(scene, pose), []
+    while len(nearest) < len(scene.groups):
+        pair, distance = closest_pair(scene, world, pose.q, REACH)
+        if pair is None or (distance >= 0 and len(nearest) >= SHOWN):
+            break
+        nearest.append((distance, " and ".join(pair)))
+        met = scene.ignored([group_of[frozenset(pair)]])
+        world = world._replace(ignored=np.asarray(world.ignored) | met)
+    deep = sum(distance < 0 for distance, _ in nearest)
+    verdict = f"in collision, {deep} of the pairs of bodies" if deep else "free"
+    print(f"pose {pose.name}: {verdict}")
+    for distance, names in nearest:
+        print(f"  {1000 * distance:8.2f} mm  {names}")
+    return not deep
+
+
+def _suggest_excludes(scene: Scene) -> None:
+    """Bodies in contact in nearly every pose, as lines for the model's `<contact>`."""
+    if touching := always_touching(scene):
+        print(
+            "in contact in nearly every pose, or never moved against each other by the"
+        )
+        print("arm; such pairs leave nothing to plan. To leave them out, in <contact>:")
+    for group, share in touching:
+        body1, body2 = group.split("|")
+        print(f'  <exclude body1="{body1}" body2="{body2}"/>  <!-- {share:.0%} -->')

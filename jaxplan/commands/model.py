@@ -1,0 +1,109 @@
+"""A model and its poses as people name them on the command line."""
+
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from jaxplan.collision import World, make_world
+from jaxplan.collision.world import object_address
+from jaxplan.scene import Scene
+from jaxplan.scene.names import known
+
+
+class Pose(NamedTuple):
+    """The arm's joints, and the rest of the model."""
+
+    name: str
+    q: np.ndarray
+    """`[d]` [rad or m]."""
+    qpos: np.ndarray
+    """`[nq]` all of the model's; as in the key frame or the reference pose."""
+
+
+def read_scene(path: Path, joints: str | None, hand: str | None) -> Scene:
+    """Reads an MJCF; `joints` are names with commas between them.
+
+    Raises:
+        FileNotFoundError: There is no such file.
+        ValueError: What is wrong in it, in one line.
+    """
+    names = None if joints is None else [name.strip() for name in joints.split(",")]
+    return Scene.from_mjcf(path, names, hand)
+
+
+def read_pose(scene: Scene, text: str, role: str) -> Pose:
+    """A key frame by name, or as many numbers as the arm has joints, with commas between.
+
+    Args:
+        scene: The scene.
+        text: What was given.
+        role: What it is for, such as "start".
+
+    Raises:
+        ValueError: It is neither.
+    """
+    model, d = scene.mj_model, len(scene.joints)
+    keys = [model.key(i).name for i in range(model.nkey) if model.key(i).name]
+    parts = text.replace(",", " ").split()
+    if text in keys or (len(parts) < 2 and not all(map(_is_number, parts))):
+        if not keys:
+            raise ValueError(
+                f"{role}: no key frame {text!r}, the model has none; give {d} numbers"
+            )
+        try:
+            qpos = model.key(known(text, "key frame", keys)).qpos.copy()
+        except ValueError as error:
+            raise ValueError(f"{role}: {error}") from None
+        return Pose(repr(text), qpos[scene.addresses(scene.joints)], qpos)
+    if wrong := [part for part in parts if not _is_number(part)]:
+        raise ValueError(f"{role}: {wrong[0]!r} is not a number")
+    if len(parts) != d:
+        raise ValueError(
+            f"{role} has {len(parts)} numbers, expected {d}: {', '.join(scene.joints)}"
+        )
+    q = np.array(parts, float)
+    for joint in np.flatnonzero(~np.isfinite(q)):
+        raise ValueError(
+            f"{role} is not finite: joint {scene.joints[joint]!r} is {q[joint]}"
+        )
+    return Pose(text, q, with_joints(scene, model.qpos0, q[None])[0])
+
+
+def default_pose(scene: Scene) -> Pose:
+    """The key frame `home`, or the first one, or the reference pose."""
+    model = scene.mj_model
+    keys = [model.key(i).name for i in range(model.nkey)]
+    if keys:
+        key = keys.index("home") if "home" in keys else 0
+        qpos = model.key(key).qpos.copy()
+        return Pose(repr(keys[key]), qpos[scene.addresses(scene.joints)], qpos)
+    return Pose(
+        "reference", model.qpos0[scene.addresses(scene.joints)], model.qpos0.copy()
+    )
+
+
+def world_at(scene: Scene, pose: Pose) -> World:
+    """Fingers and objects where the pose has them."""
+    world = make_world(scene, passive=pose.qpos[scene.addresses(scene.passive)])
+    objects = np.array(world.object_pose)
+    for row, name in enumerate(scene.objects):
+        if name not in scene.mocap:
+            start = object_address(scene, name)
+            objects[row] = pose.qpos[start : start + 7]
+    return make_world(scene, objects, passive=world.passive)
+
+
+def with_joints(scene: Scene, qpos: np.ndarray, q: np.ndarray) -> np.ndarray:
+    """`[T, nq]`: `qpos [nq]` with the arm at `q [T, d]`."""
+    rows = np.tile(qpos, (len(q), 1))
+    rows[:, scene.addresses(scene.joints)] = q
+    return rows
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True

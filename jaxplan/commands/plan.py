@@ -1,0 +1,141 @@
+"""`jaxplan plan`: from one pose of a model to another, certified, timed, on film."""
+
+import json
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from jaxplan.collision import Certificate
+from jaxplan.commands.model import Pose, read_pose, read_scene, with_joints, world_at
+from jaxplan.config import PlannerConfig
+from jaxplan.planner import Plan, Planner, Timed
+from jaxplan.provenance import versions
+from jaxplan.scene import Scene
+from jaxplan.simulation.video import FPS, film_motion
+
+
+def plan(
+    path: Path,
+    start: str,
+    goal: str,
+    seed: int = 0,
+    out: Path | None = None,
+    video: bool = False,
+    joints: str | None = None,
+    hand: str | None = None,
+    velocity: float = 1.0,
+    acceleration: float = 2.0,
+    config: PlannerConfig = PlannerConfig(),
+) -> bool:
+    """Plans, asks C MuJoCo about path and motion, and says what came of it.
+
+    Args:
+        path: Of the MJCF.
+        start: Key frame or numbers; fingers and objects stand as in its key frame.
+        goal: Key frame or numbers.
+        seed: Of the search.
+        out: Directory for `plan.json` and `plan.mp4`; None writes nothing.
+        video: Whether to render the motion.
+        joints: See `read_scene`.
+        hand: See `read_scene`.
+        velocity: Of each joint at most [rad/s or m/s].
+        acceleration: Of each joint at most [rad/s^2 or m/s^2].
+        config: Of the planner.
+
+    Returns:
+        Whether there is a certified motion.
+
+    Raises:
+        ValueError: Bad input.
+    """
+    if video and out is None:
+        raise ValueError("--video needs --out")
+    scene = read_scene(path, joints, hand)
+    first, last = read_pose(scene, start, "start"), read_pose(scene, goal, "goal")
+    planner = Planner(scene, config, velocity=velocity, acceleration=acceleration)
+    if out is not None:
+        out.mkdir(parents=True, exist_ok=True)
+    world = world_at(scene, first)
+    began = time.perf_counter()
+    planner.plan(
+        first.q, first.q, seed, world
+    )  # compiles, so that times are of the search
+    print(
+        f"{path}: {len(scene.joints)} joints, {len(scene.pairs)} pairs that can touch"
+    )
+    print(f"ready in {time.perf_counter() - began:.1f} s")
+    answer = planner.plan(first.q, last.q, seed, world)
+    _show(answer)
+    timed, certificates = None, {}
+    if answer.solved:
+        timed = planner.time(answer)
+        paths = {"path": answer.path, "motion": timed.q}
+        certificates = {k: planner.certify(q, world) for k, q in paths.items()}
+        print(f"motion: {timed.t[-1]:.2f} s, {len(timed.t)} samples")
+        for name, certificate in certificates.items():
+            print(f"C MuJoCo on the {name}: {_verdict(certificate)}")
+    good = answer.solved and all(c.valid for c in certificates.values())
+    if out is not None:
+        record = _record(path, scene, (first, last), answer, timed, certificates)
+        (out / "plan.json").write_text(json.dumps(record, indent=1) + "\n")
+        written = [out / "plan.json"]
+        if video and timed is not None:
+            written.append(out / "plan.mp4")
+            frames = np.arange(0, timed.t[-1] + 1 / FPS, 1 / FPS)
+            q = np.stack([np.interp(frames, timed.t, joint) for joint in timed.q.T], -1)
+            film_motion(written[1], scene.mj_model, with_joints(scene, first.qpos, q))
+        print(f"written: {', '.join(map(str, written))}")
+    return good
+
+
+def _show(answer: Plan) -> None:
+    status = answer.status.name.lower()
+    print(f"{status}: {answer.reason}" if answer.reason else status)
+    print(
+        f"search: {answer.expansions} expansions, {answer.checks} checks, "
+        f"{answer.time:.3f} s"
+    )
+    if answer.solved:
+        print(f"path: {len(answer.path)} waypoints, {answer.length:.3f} rad")
+
+
+def _verdict(certificate: Certificate) -> str:
+    """A certificate in words."""
+    verdict = "free" if certificate.valid else "refused"
+    if certificate.pair is None:
+        return verdict
+    deep = f"{-1000 * certificate.clearance:.2f} mm deep"
+    return (
+        f"{verdict}, {' and '.join(certificate.pair)} {deep} at {certificate.where:.2f}"
+    )
+
+
+def _record(
+    path: Path,
+    scene: Scene,
+    ends: tuple[Pose, Pose],
+    answer: Plan,
+    timed: Timed | None,
+    certificates: dict[str, Certificate],
+) -> dict[str, Any]:
+    """What `plan.json` holds; lengths in rad or m, times in s."""
+    return {
+        "model": str(path),
+        "joints": scene.joints,
+        "start": ends[0].q.tolist(),
+        "goal": ends[1].q.tolist(),
+        "seed": answer.seed,
+        "status": answer.status.name.lower(),
+        "reason": answer.reason,
+        "expansions": answer.expansions,
+        "checks": answer.checks,
+        "seconds": answer.time,
+        "length": answer.length,
+        "path": answer.path.tolist(),
+        "certified": {name: c.valid for name, c in certificates.items()},
+        "trajectory": timed
+        and {name: getattr(timed, name).tolist() for name in ("t", "q", "qd", "qdd")},
+        "versions": versions(),
+    }
