@@ -1,6 +1,6 @@
-"""Every setting, as frozen dataclasses. Defaults are the paper's numbers where it gives them;
-`PlannerConfig` alone has defaults of its own, and the paper's in `PAPER_PLANNER`.
+"""Every setting, as frozen dataclasses. Defaults are the paper's numbers where it gives them.
 
+Only `PlannerConfig` has defaults of its own; the paper's are in `PAPER_PLANNER`.
 A file in `configs/` holds differences from these defaults and nothing else.
 """
 

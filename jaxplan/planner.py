@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from jaxplan import collision
-from jaxplan.collision import OWN_AXES, Certificate, World, make_world
+from jaxplan.collision import Certificate, World, make_world
 from jaxplan.config import PlannerConfig, TrajectoryConfig
 from jaxplan.planning import PlanResult, Segment, Status, make_planner
 from jaxplan.scene import Scene
@@ -276,8 +276,9 @@ class Planner:
                 raise ValueError(
                     f"seed {seed!r}, expected an integer from 0 to 2^32 - 1"
                 )
-        world = self._checked(self.empty_world if world is None else world, (count,))
-        own = bool(world.passive.ndim > OWN_AXES.passive)
+        empty = self.empty_world
+        world = self._checked(empty if world is None else world, (count,))
+        own = bool(world.passive.ndim > empty.passive.ndim)
         if not count:
             return []
         began = time.perf_counter()

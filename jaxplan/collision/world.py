@@ -10,7 +10,6 @@ import numpy.typing as npt
 
 from jaxplan.scene import Scene
 
-
 SIZES = {"sphere": 1, "capsule": 2, "cylinder": 2, "ellipsoid": 3, "box": 3}
 """Numbers that give an obstacle's size."""
 FAR = (0.0, 0.0, 1000.0, 1.0, 0.0, 0.0, 0.0)
@@ -49,7 +48,7 @@ class World(NamedTuple):
     """`[..., n_slots, 3]` their sizes as MuJoCo's [m]."""
 
 
-OWN_AXES = World(2, 1, 1, 1, 2, 2)  # type: ignore[arg-type]
+OWN_AXES = (2, 1, 1, 1, 2, 2)
 """How many of each leaf's axes are not batch axes."""
 
 
@@ -82,7 +81,9 @@ def make_world(
         held = np.zeros(len(scene.objects), bool)
     if scene.mocap and np.any(np.asarray(held)[..., -len(scene.mocap) :]):
         names = ", ".join(scene.mocap)
-        raise ValueError(f"mocap bodies cannot be held, they have no free joint: {names}")
+        raise ValueError(
+            f"mocap bodies cannot be held, they have no free joint: {names}"
+        )
     if passive is None:
         passive = scene.mj_model.qpos0[scene.addresses(scene.passive)]
     return World(
@@ -94,9 +95,7 @@ def make_world(
     )
 
 
-def _fill(
-    scene: Scene, obstacles: Iterable[Obstacle]
-) -> tuple[jax.Array, jax.Array]:
+def _fill(scene: Scene, obstacles: Iterable[Obstacle]) -> tuple[jax.Array, jax.Array]:
     """`slot_pose` and `slot_size` with each obstacle in the first free slot of its kind."""
     pose = np.tile(np.array(FAR, np.float32), (len(scene.slots), 1))
     size = np.full((len(scene.slots), 3), 0.01, np.float32)
@@ -110,7 +109,10 @@ def _fill(
                 f"{sum(slot.kind == obstacle.kind for slot in scene.slots)} "
                 "(see `slots` of Scene.from_mjcf)"
             )
-        if len(obstacle.pose) not in (3, 7) or len(obstacle.size) != SIZES[obstacle.kind]:
+        if (
+            len(obstacle.pose) not in (3, 7)
+            or len(obstacle.size) != SIZES[obstacle.kind]
+        ):
             raise ValueError(
                 f"{obstacle}: expected {SIZES[obstacle.kind]} sizes and a pose of 3 or 7"
             )

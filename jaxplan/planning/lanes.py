@@ -24,7 +24,6 @@ from jaxplan.planning.result import PlanResult, Status
 from jaxplan.planning.segment import Limits, Segment
 from jaxplan.planning.state import Query, State, searching
 
-
 SHORTER = 0.999
 """A search for a shorter path looks for one that is shorter by this factor at least."""
 

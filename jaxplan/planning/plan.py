@@ -92,12 +92,13 @@ def make_planner(
     def plan(
         worlds: Worlds, q_start, q_goal, q_toggle, keys, draw=None, active=None
     ) -> PlanResult:
+        unbounded: Any = np.full(len(keys), np.inf, np.float32)
         query = Query(
             _batch(q_start, d, "q_start"),
             _batch(q_goal, d, "q_goal"),
             _batch(q_toggle, d, "q_toggle"),
             keys,
-            np.full(len(keys), np.inf, np.float32),
+            unbounded,
         )
         problems = len(query.q_start)
         if {len(q) for q in query} != {problems}:
@@ -121,7 +122,7 @@ def make_planner(
     return plan
 
 
-def _batch(q, d: int, name: str) -> np.ndarray:
+def _batch(q, d: int, name: str) -> Any:
     q = np.asarray(q, np.float32)
     if q.ndim != 2 or q.shape[1] != d:
         raise ValueError(f"{name} has shape {q.shape}, expected (problems, {d})")

@@ -26,7 +26,7 @@ from jaxplan.planning.edges import ConfigFree, motions_free, points_for
 from jaxplan.planning.proposal import draw_numbers
 from jaxplan.planning.result import PlanResult, Status
 from jaxplan.planning.segment import Limits, Segment, extend
-from jaxplan.planning.state import Move, Outcome, Query, State, searching
+from jaxplan.planning.state import Move, Outcome, Query, State
 from jaxplan.planning.tree import (
     at,
     bare,
@@ -61,7 +61,8 @@ def examine(query: Query, limits: Limits) -> tuple[Query, jax.Array]:
     given = jnp.stack(query[:3])
     finite = jnp.all(jnp.isfinite(given), axis=(0, 2))
     middle = 0.5 * (limits[0] + limits[1])
-    query = Query(*jnp.where(finite[:, None], given, middle), query.key, query.bound)
+    q_start, q_goal, q_toggle = jnp.where(finite[:, None], given, middle)
+    query = Query(q_start, q_goal, q_toggle, query.key, query.bound)
     ends = jnp.stack([query.q_start, query.q_goal])
     over = (ends < limits[0] - LIMIT_SLACK) | (ends > limits[1] + LIMIT_SLACK)
     over = jnp.any(over, axis=(0, 2))
