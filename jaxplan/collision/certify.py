@@ -13,6 +13,11 @@ from jaxplan.collision.world import OWN_AXES, World, batch_shape, object_address
 from jaxplan.scene import Scene
 from jaxplan.scene.contacts import KINDS
 
+PLANE = int(mujoco.mjtGeom.mjGEOM_PLANE)
+ITERATED = [
+    code for code, name in KINDS.items() if name in ("ellipsoid", "cylinder", "mesh")
+]
+
 
 class Certificate(NamedTuple):
     """What C MuJoCo says about a path."""
@@ -214,9 +219,30 @@ def contacts_of(
             carry(scene, data, np.asarray(worlds.held[i]))
             mujoco.mj_kinematics(model, data)
         mujoco.mj_collision(model, data)
-        geoms, distance = data.contact.geom, data.contact.dist
+        geoms = data.contact.geom
         counts = ~silent[i, table[geoms[:, 0], geoms[:, 1]]]
-        yield distance[counts], geoms[counts]
+        geoms, distance = geoms[counts], data.contact.dist[counts]
+        _measure(model, data, geoms, distance)
+        near = distance <= reach
+        yield distance[near], geoms[near]
+
+
+def _measure(
+    model: mujoco.MjModel, data: mujoco.MjData, geoms: np.ndarray, distance: np.ndarray
+) -> None:
+    """Corrects, in place, distances `[k]` of `geoms [k, 2]` that have no closed form.
+
+    `mj_collision` finds all pairs within the margin, but takes the distance of such a pair
+    from the depth of geoms blown up by it: centimetres off for a capsule near a cylinder,
+    and millimetres where they touch. `mj_geomDistance` measures the geoms themselves.
+    """
+    kinds = model.geom_type[geoms]
+    for row in np.flatnonzero(
+        np.isin(kinds, ITERATED).any(-1) & (kinds != PLANE).all(-1)
+    ):
+        i, j = map(int, geoms[row])
+        far = max(1.0, 2 * distance[row])
+        distance[row] = mujoco.mj_geomDistance(model, data, i, j, far, None)
 
 
 def _nearest(
