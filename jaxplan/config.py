@@ -31,7 +31,7 @@ class PlannerConfig:
     """Probability that a uniform proposal goes straight toward q_goal."""
     step_min: float = 1.0
     step_max: float = 1.0
-    """Step length of every sampler, s in [step_min, step_max] [rad]."""
+    """Step length of every sampler, s in `[step_min, step_max]` [rad]."""
     goal_tolerance: float = 0.05
     """A node reaches q_goal within this distance [rad]."""
     goal_connect: float = 0.3

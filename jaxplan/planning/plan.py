@@ -15,6 +15,7 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
+from numpy.typing import ArrayLike
 
 from jaxplan.config import PlannerConfig
 from jaxplan.planning import lanes, search
@@ -28,8 +29,8 @@ Worlds = Any
 def make_planner(
     config_free: Callable[[Worlds, jax.Array, jax.Array], jax.Array],
     config: PlannerConfig,
-    q_min,
-    q_max,
+    q_min: ArrayLike,
+    q_max: ArrayLike,
     jit: Callable[[Callable], Callable] = jax.jit,
 ) -> Callable[..., PlanResult]:
     """Builds a planner for batches of problems.
