@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from jaxplan.config import PlannerConfig
+from jaxplan.config import PAPER_PLANNER
 from jaxplan.tasks.mug import scene
 from jaxplan.tasks.mug.expert import Expert, Toggle
 from jaxplan.tasks.mug.kinematics import InverseKinematics
@@ -87,7 +87,7 @@ def test_planning_spheres_cover_the_mug():
         if name.startswith("wall"):  # the inner corners need no cover
             corner_radius = np.hypot(corners[:, 0], corners[:, 1])
             outside = outside[corner_radius > shape.radius - shape.wall / 2]
-        assert outside.min(axis=1).max() < PlannerConfig().margin / 2, name
+        assert outside.min(axis=1).max() < PAPER_PLANNER.margin / 2, name
 
 
 def test_inverse_kinematics_reaches_its_pose(model):

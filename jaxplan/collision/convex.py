@@ -23,6 +23,7 @@ from jaxplan.collision.shapes import (
     dot,
     larger,
     minus,
+    once,
     plus,
     times,
     where,
@@ -39,7 +40,7 @@ from jaxplan.collision.solids import (
 Best = tuple[jax.Array, Vector]
 """A signed distance found [m], and the direction."""
 
-TILE = 512
+TILE = 256
 """Pairs that are searched together: few enough for the cache."""
 ROUNDS = 2
 """Searches for a shorter way out of something round or a mesh, see `_depth`."""
@@ -102,10 +103,10 @@ def _pair(kinds: tuple[str, str], a: Shapes, b: Shapes) -> Pair:
     one, other = kinds
     offset = [dot(axis, minus(a.centre, b.centre)) for axis in b.axes]
     axes = [[dot(axis, own) for axis in b.axes] for own in a.axes]
-    a, b, offset, axes = jax.lax.optimization_barrier((a, b, offset, axes))
+    offset, axes = once((offset, axes))
 
     def support(against: Vector) -> Vector:
-        own = farthest(one, a, [-dot(axis, against) for axis in axes])
+        own = once(farthest(one, a, [-dot(axis, against) for axis in axes]))
         point = minus(offset, farthest(other, b, against))
         for i in extends(one):
             point = plus(point, times(own[i], axes[i]))
@@ -200,7 +201,7 @@ def _depth(pair: Pair, rounds: int) -> jax.Array:
         return attempt(best, _unit(nearest))
 
     best, _ = jax.lax.scan(both, (one - jnp.inf, own[0]), ways)
-    return -jax.lax.fori_loop(0, rounds, refine, best)[0]
+    return -(jax.lax.fori_loop(0, rounds, refine, best) if rounds else best)[0]
 
 
 def _unit(x: Vector) -> Vector:

@@ -21,6 +21,7 @@ from jaxplan.collision.shapes import (
     dot,
     larger,
     minus,
+    once,
     smaller,
     times,
     total,
@@ -68,26 +69,22 @@ def nearest_point(
 
     def step(state: _State) -> _State:
         corners, nearest, squared = state.corners, state.nearest, state.squared
-        # The barriers here and below: XLA would compute all of it again for each use.
-        new = jax.lax.optimization_barrier(support(nearest))
+        new = once(support(nearest))
         edges = [minus(corner, new) for corner in corners]
-        weights, least = _next_to_origin(new, edges)
-        better = least < squared
+        size = dot(new, new) + total(dot(edge, edge) for edge in edges)
+        contact = PRECISION**2 * size
+        weights, better = _next_to_origin(new, edges, squared, contact)
+        inside = _combined(new, edges, weights)
+        least = dot(inside, inside)
+        least = jnp.where(least < contact, 0.0, least)
         progress = dot(nearest, new)
         open = better & (squared - progress > PRECISION * jnp.sqrt(squared))
         if reach is not None:
             apart = (progress > 0) & (progress * progress > reach * reach * squared)
             open &= (squared > reach * reach) & ~apart
-        inside = [
-            new[x] + total(w * e[x] for w, e in zip(weights, edges, strict=True))
-            for x in range(3)
-        ]
-        kept = [
-            where(better, where(w > 0, c, new), c)
-            for w, c in zip(weights, corners, strict=True)
-        ]
         return _State(
-            kept,
+            # A corner without weight makes room for the new one.
+            [where(better & (weights[i] == 0), new, corners[i]) for i in range(3)],
             where(better, inside, nearest),
             jnp.where(better, least, squared),
             state.steps + 1,
@@ -104,54 +101,71 @@ def nearest_point(
 
 
 def _next_to_origin(
-    new: Vector, edges: list[Vector]
-) -> tuple[list[jax.Array], jax.Array]:
+    new: Vector, edges: list[Vector], squared: jax.Array, contact: jax.Array
+) -> tuple[dict[int, jax.Array], jax.Array]:
     """Which point of a tetrahedron is next to the origin.
 
-    The old triangle's nearest point is known, so only what holds the new corner counts.
+    The old triangle's nearest point is known, so only what holds the new corner counts:
+    three edges, three faces, and all of it.
 
     Args:
         new: The new corner.
         edges: From it to the others.
+        squared: Squared distance of the old triangle [m^2].
+        contact: That which counts as none [m^2].
 
     Returns:
-        Weights of the edges, and the squared distance.
+        Weights of the edges, and whether that is nearer than the old triangle.
     """
-    squares = [dot(edge, edge) for edge in edges]
     moments = [cross(edge, new) for edge in edges]
     normals = [cross(edges[k - 2], edges[k - 1]) for k in range(3)]
     candidates: list[dict[int, jax.Array]] = []
-    for i in range(3):
-        share = -dot(new, edges[i]) / larger(squares[i], TINY)
+    for i, edge in enumerate(edges):
+        square = larger(dot(edge, edge), TINY)
+        share = -dot(new, edge) / square
+        share -= dot(_combined(new, edges, {i: share}), edge) / square
         candidates.append({i: smaller(larger(share, 0.0), 1.0)})
-    for k in range(3):
-        i, j, area = (k + 1) % 3, (k + 2) % 3, larger(dot(normals[k], normals[k]), TINY)
-        u, v = dot(moments[j], normals[k]) / area, -dot(moments[i], normals[k]) / area
+    for k, normal in enumerate(normals):
+        i, j, area = (k + 1) % 3, (k + 2) % 3, larger(dot(normal, normal), TINY)
+        u, v = dot(moments[j], normal) / area, -dot(moments[i], normal) / area
+        left = _combined(new, edges, {i: u, j: v})
+        u += dot(cross(edges[j], left), normal) / area
+        v -= dot(cross(edges[i], left), normal) / area
         candidates.append(dict(zip((i, j), _clipped([u, v]), strict=True)))
     volume = dot(edges[0], normals[0])
     volume = jnp.where(jnp.abs(volume) < TINY, TINY, volume)
-    shares = _clipped([-dot(new, normal) / volume for normal in normals])
+    shares = [-dot(new, normal) / volume for normal in normals]
+    # Of a flat tetrahedron they are rough; what is left over says by how much.
+    left = _combined(new, edges, dict(enumerate(shares)))
+    shares = [x - dot(left, n) / volume for x, n in zip(shares, normals, strict=True)]
+    shares = _clipped(shares)
     candidates.append(dict(enumerate(shares)))
-    candidates = jax.lax.optimization_barrier(candidates)
+    candidates = once(candidates)
 
-    contact = PRECISION**2 * (dot(new, new) + total(squares))
-    least, choice = dot(new, new), jnp.full(new[0].shape, -1)
+    least, choice = squared, jnp.full_like(squared, -1)
     for k, shares in enumerate(candidates):
-        point = [
-            new[x] + total(w * edges[i][x] for i, w in shares.items()) for x in range(3)
-        ]
-        squared = dot(point, point)
-        if len(shares) == 3:  # counts only where it holds the origin: then all is said
-            squared = jnp.where(squared < contact, squared, jnp.inf)
-        choice = jnp.where(squared < least, k, choice)
-        least = smaller(squared, least)
-    choice, least = jax.lax.optimization_barrier((choice, least))
-    weights = [jnp.zeros_like(least)] * 3
+        point = _combined(new, edges, shares)
+        length = dot(point, point)
+        if len(shares) == 3:  # counts only where it holds the origin: that ends it
+            length = jnp.where(length < contact, length, jnp.inf)
+        choice = jnp.where(length < least, float(k), choice)
+        least = smaller(length, least)
+    choice = once(choice)
+    weights = [jnp.zeros_like(squared)] * 3
     for k, shares in enumerate(candidates):
         for i, share in shares.items():
             weights[i] = jnp.where(choice == k, share, weights[i])
-    least = jnp.where(least < contact, 0.0, least)
-    return jax.lax.optimization_barrier((weights, least))
+    return dict(enumerate(weights)), choice >= 0
+
+
+def _combined(
+    new: Vector, edges: list[Vector], weights: dict[int, jax.Array]
+) -> Vector:
+    """The point that some weights of the edges give."""
+    return [
+        x + total(weight * edges[i][k] for i, weight in weights.items())
+        for k, x in enumerate(new)
+    ]
 
 
 def _clipped(weights: list[jax.Array]) -> list[jax.Array]:

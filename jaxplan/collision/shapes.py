@@ -5,8 +5,8 @@ the frames of their bodies, where they are constants, and carried to where they 
 """
 
 from collections.abc import Iterable, Sequence
-from functools import reduce
-from typing import NamedTuple
+from functools import partial, reduce
+from typing import NamedTuple, TypeVar
 
 import jax
 import jax.numpy as jnp
@@ -18,6 +18,8 @@ from jaxplan.scene import Scene
 
 Vector = list[jax.Array]
 """Three coordinates, each an array of its own."""
+
+Values = TypeVar("Values")
 
 
 class Score(NamedTuple):
@@ -142,6 +144,20 @@ def times(factor: jax.Array, a: Vector) -> Vector:
 def where(choose: jax.Array, a: Vector, b: Vector) -> Vector:
     """The vector a where chosen, else b."""
     return [jnp.where(choose, x, y) for x, y in zip(a, b, strict=True)]
+
+
+def once(values: Values) -> Values:
+    """Some arrays of floats, made sure to be computed once.
+
+    XLA on CPU computes what several results share again for each of them, rounded in
+    another way, and looks past any `optimization_barrier`. Where a comparison decides,
+    results then need not belong together. It does not look through a condition.
+    """
+    if jax.default_backend() != "cpu":
+        return jax.lax.optimization_barrier(values)
+    always = jax.tree.leaves(values)[0].reshape(-1)[0] < jnp.inf
+    zeros = partial(jax.tree.map, jnp.zeros_like, values)
+    return jax.lax.cond(always, lambda: values, zeros)
 
 
 def _vertices(model: mujoco.MjModel, ids: tuple[int, ...]) -> list[jax.Array]:

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import jax
 import jax.numpy as jnp
 
-from jaxplan.collision.shapes import Shapes, Vector, dot, larger, smaller
+from jaxplan.collision.shapes import Shapes, Vector, dot, larger, once, smaller, where
 
 Best = tuple[jax.Array, Vector]
 """How far along a direction, and the point."""
@@ -92,12 +92,13 @@ def _farthest_vertex(vertices: Sequence[jax.Array], along: Vector) -> Vector:
 
     def look(best: Best, chunk: jax.Array) -> tuple[Best, None]:
         height, point = best
-        for vertex in chunk:
-            new = dot(list(vertex), along)
-            higher = new > height
-            height = jnp.where(higher, new, height)
-            pairs = zip(vertex, point, strict=True)
-            point = [jnp.where(higher, x, y) for x, y in pairs]
+        # Were heights computed again for each coordinate, and rounded in
+        # another way, the point would be made of two vertices.
+        new = [dot(list(vertex), along) for vertex in chunk]
+        for own, vertex in zip(once(new), chunk, strict=True):
+            higher = own > height
+            height = jnp.where(higher, own, height)
+            point = where(higher, list(vertex), point)
         return (height, point), None
 
     zero = jnp.zeros_like(along[0])
