@@ -99,8 +99,8 @@ class MotionPlanner:
         q_start = np.asarray(q_start, np.float32)
         q_goal = np.asarray(q_goal, np.float32)
         began = time.perf_counter()
-        first = self._nearest_free(worlds, q_start)
-        last = self._nearest_free(worlds, q_goal)
+        first = self.nearest_free(worlds, q_start)
+        last = self.nearest_free(worlds, q_goal)
         result = jax.block_until_ready(
             self._search(worlds, first, last, q_toggle, keys, draw, active)
         )
@@ -138,8 +138,8 @@ class MotionPlanner:
             return "nothing"
         return f"{pair[0]} and {pair[1]}, {1000 * distance:.1f} mm apart"
 
-    def _nearest_free(self, worlds: World, q: np.ndarray) -> np.ndarray:
-        """`q` [P, d], but the nearest free neighbour where it is in collision and has one.
+    def nearest_free(self, worlds: World, q: np.ndarray) -> np.ndarray:
+        """`q` [P, d] [rad], but the nearest free neighbour where it is in collision and has one.
 
         Joints outside the limits, or not finite, are left for the search to refuse.
         """

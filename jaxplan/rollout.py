@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple, Protocol
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 
 from jaxplan.collision import World
@@ -134,11 +135,18 @@ class Phase(NamedTuple):
     """Episodes in the terminal region: they back off, and end."""
     worlds: World
     """What the search was told of each lane's world."""
-    segments: Segment | None
+    draw: Callable[[jax.Array], Segment] | None
+    """The learned sampler with this round's conditions: chunk (B,) -> segments."""
     motion: Motion
     """Rows are lanes: row e belongs to episode e of the batch."""
     executed: list[int]
     """Episodes that will move; the others found no way."""
+
+    @property
+    def segments(self) -> Segment | None:
+        """The first learned segments of each lane, whether or not the search needed them."""
+        lanes = len(self.motion.q)
+        return self.draw and self.draw(jnp.zeros(lanes, jnp.int32))
 
 
 Predict = Callable[[Any, list[int]], Targets]
@@ -257,14 +265,7 @@ def _plan(
     touching[running] |= last
     worlds = task.worlds(touching)
     keys = _keys(batch.seeds, task.batch, number)
-    draw_bank = propose and propose(observation, targets, running, keys)
-    segments: list[Segment] = []
-
-    def draw(chunk: jax.Array) -> Segment:
-        assert draw_bank is not None
-        segments.append(draw_bank(chunk))
-        return segments[-1]
-
+    draw = propose and propose(observation, targets, running, keys)
     # Lanes that are not running are padding, so that nothing recompiles.
     query = np.zeros((3, task.batch, observation.q.shape[1]), np.float32)
     query[:, running] = observation.q, targets.q_goal, targets.q_toggle
@@ -274,7 +275,7 @@ def _plan(
         q_goal=query[1],
         q_toggle=query[2],
         keys=keys,
-        draw=None if draw_bank is None else draw,
+        draw=draw,
         active=np.isin(np.arange(task.batch), running),
         speed=np.where(task.closed, config.carry_speed, 1.0),
     )
@@ -286,7 +287,7 @@ def _plan(
         last=last,
         leaving=leaving,
         worlds=worlds,
-        segments=segments[0] if segments else None,
+        draw=draw,
         motion=motion,
         executed=[e for e in running if len(motion.q[e]) > 1],
     )

@@ -517,3 +517,27 @@ def test_refuses_arrays_of_the_wrong_shape():
         plan(worlds, q_start, q_goal[:, :6], q_goal, keys)
     with pytest.raises(ValueError, match="lengths"):
         plan(worlds, q_start, q_goal[:2], q_goal, keys)
+
+
+def test_the_sampler_is_asked_when_a_search_asks():
+    """Where straight motions are free, no segment is drawn; answers do not change."""
+    worlds, q_start, q_goal, keys = problems(6, seed=3)
+    config = settings_of(method="rrt_connect", max_expansions=60)
+    limit = np.full(7, Q_MAX)
+    plan = make_planner(config_free, config, -limit, limit)
+    draw, asked = noisy_sampler(q_start, q_goal, keys), []
+
+    def listened(chunk):
+        asked.append(np.asarray(chunk))
+        return draw(chunk)
+
+    first = plan(worlds, q_start, q_goal, q_goal, keys, listened)
+    asked.clear()
+    again = plan(worlds, q_start, q_goal, q_goal, keys, listened)
+    assert_same_answers(first, again)
+    assert any(np.any(chunk >= 0) for chunk in asked)
+    for chunk in asked:
+        assert np.all(np.asarray(first.learned)[chunk >= 0] > 0)
+    asked.clear()
+    plan(worlds, q_start, q_start, q_start, keys, listened)
+    assert asked == []

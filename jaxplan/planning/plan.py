@@ -47,7 +47,8 @@ def make_planner(
         `plan(worlds, q_start [P, d], q_goal [P, d], q_toggle [P, d], keys [P], draw=None,
         active=None) -> PlanResult`. `draw(chunk [P]) -> Segment [P, M]` gives the learned
         segments `chunk * M` to `chunk * M + M - 1` of each problem; without it all
-        proposals are uniform. `active [P]` is false for padding lanes.
+        proposals are uniform. It is asked when a search asks for a segment (the very first
+        call also asks to see how large M is). `active [P]` is false for padding lanes.
 
     Raises:
         ValueError: A setting or a limit that makes no sense, or arrays of the wrong shape.
@@ -82,10 +83,14 @@ def make_planner(
 
     @jit
     def start(query: Query, active: jax.Array):
-        # A lane for each problem: the sampler's banks are by problem.
-        return begin(query, active, len(active))
+        # A lane for each problem: the sampler's banks are by problem. There is none yet.
+        state, query, status = begin(query, active, len(active))
+        chunk = jnp.full_like(state.state.chunk, -1)
+        return state._replace(state=state.state._replace(chunk=chunk)), query, status
 
     guided = jit(run)
+    rows: list[int] = []
+    """M, once a bank was seen."""
 
     def _limits():
         return jnp.asarray(q_min), jnp.asarray(q_max)
@@ -109,16 +114,20 @@ def make_planner(
         if draw is None or config.p_uniform >= 1:
             return uniform(worlds, query, active)
         state, query, status = start(query, active)
-        waiting = np.ones(problems, bool)
-        while waiting.any():
-            bank = draw(state.state.chunk)
-            if bank.length.shape[1] < config.workers:
-                raise ValueError(
-                    f"a bank of {bank.length.shape[1]} segments for {config.workers} workers"
-                )
+        if not rows:
+            rows.append(draw(jnp.zeros(problems, jnp.int32)).length.shape[1])
+        if rows[0] < config.workers:
+            raise ValueError(
+                f"a bank of {rows[0]} segments for {config.workers} workers"
+            )
+        # Nobody reads it: whoever asks for a segment waits for the first bank.
+        shape = problems, rows[0]
+        bank = Segment(jnp.zeros((*shape, d)), jnp.zeros(shape))
+        while True:
             state = guided(worlds, state, query, status, bank)
-            waiting = np.asarray(state.state.waiting)
-        return state.answers
+            if not np.asarray(state.state.waiting).any():
+                return state.answers
+            bank = draw(state.state.chunk)
 
     return plan
 
