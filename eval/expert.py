@@ -22,6 +22,7 @@ from jaxplan.motion import MotionPlanner
 from jaxplan.rollout import Targets, rollout
 from jaxplan.scene.panda import PANDA_LIMITS
 from jaxplan.tasks.mug.demonstrate import ExpertPolicy
+from jaxplan.tasks.mug.scene import Variant
 from jaxplan.tasks.mug.task import MugTask
 
 
@@ -32,13 +33,14 @@ class Args:
     seeds: str = "0:200"
     out: Path = Path("runs/expert.json")
     batch: int = 32
+    variant: Variant = "plain"
     planner: PlannerConfig = dataclasses.replace(PAPER_PLANNER, p_uniform=1.0)
 
 
 def main(args: Args) -> None:
     """Runs, prints, writes JSON."""
     seeds = parse_seeds(args.seeds)
-    task = MugTask(min(args.batch, len(seeds)))
+    task = MugTask(min(args.batch, len(seeds)), variant=args.variant)
     planner = MotionPlanner(task.planning_scene, PANDA_LIMITS, args.planner)
     policy = ExpertPolicy(task, DemonstrationConfig(noisy_episodes=0.0))
     certification = Certification(planner)

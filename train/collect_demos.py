@@ -16,6 +16,7 @@ from tqdm import tqdm
 from jaxplan import data
 from jaxplan.cli import run_script
 from jaxplan.config import PAPER_PLANNER, DemonstrationConfig
+from jaxplan.tasks.mug.scene import Variant
 
 
 @dataclass(frozen=True)
@@ -28,6 +29,7 @@ class Args:
     shard_size: int = 32
     """Episodes a shard; one batch in lockstep."""
     camera: str = "hand"
+    variant: Variant = "plain"
     workers: int = field(default_factory=lambda: os.cpu_count() or 1)
     """Processes, each making one shard at a time. The bytes do not depend on it."""
     demonstration: DemonstrationConfig = DemonstrationConfig()
@@ -43,7 +45,7 @@ class Collector:
         from jaxplan.tasks.mug.task import MugTask
 
         self._args = args
-        self._task = MugTask(args.shard_size, args.camera)
+        self._task = MugTask(args.shard_size, args.camera, variant=args.variant)
         planner = dataclasses.replace(PAPER_PLANNER, p_uniform=1.0)
         self._planner = MotionPlanner(self._task.planning_scene, PANDA_LIMITS, planner)
         self._policy = ExpertPolicy(self._task, args.demonstration)
@@ -91,7 +93,7 @@ def main(args: Args) -> None:
     if not 0 <= args.first_seed <= 2**31 - count * args.shard_size:
         raise ValueError(f"first_seed {args.first_seed}: seeds are 0 to {2**31 - 1}")
     settings = {
-        "task": "mug",
+        "task": "mug" if args.variant == "plain" else f"mug_{args.variant}",
         "first_seed": args.first_seed,
         "shard_size": args.shard_size,
         "camera": args.camera,

@@ -15,6 +15,7 @@ from jaxplan.provenance import versions
 from jaxplan.rollout import EpisodeRecord, Phase, Predict, rollout
 from jaxplan.scene.panda import PANDA_LIMITS
 from jaxplan.simulation.physics import CONTROL_PERIOD
+from jaxplan.tasks.mug.scene import Variant
 from jaxplan.tasks.mug.task import MugTask
 
 
@@ -28,10 +29,11 @@ class Success:
     camera: str = "hand"
     batch: int = 32
     """Episodes in lockstep."""
-    inference_steps: int = 25
-    """DDIM steps."""
+    inference_steps: int | None = None
+    """Denoising steps; None: the sampler's own number, 25 for DDIM."""
     friction: float = 1.0
     """Factor on all friction; 0 shows that grasps hold by friction alone."""
+    variant: Variant = "plain"
 
 
 class Study:
@@ -51,7 +53,9 @@ class Study:
                 f"the simulation plays at {CONTROL_PERIOD} s"
             )
         self.config, self._weights = config, weights
-        self.task = MugTask(config.batch, config.camera, config.friction)
+        self.task = MugTask(
+            config.batch, config.camera, config.friction, variant=config.variant
+        )
         self.planner = MotionPlanner(
             self.task.planning_scene, PANDA_LIMITS, config.planner, config.trajectory
         )

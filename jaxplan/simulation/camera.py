@@ -5,8 +5,8 @@ import importlib
 import os
 import sys
 import weakref
-from collections.abc import Iterable, Sequence
-from typing import NamedTuple
+from collections.abc import Iterable, Iterator, Sequence
+from typing import Literal, NamedTuple
 
 import mujoco
 import numpy as np
@@ -38,13 +38,14 @@ def _use_headless_gl() -> None:
 
 
 class Mark(NamedTuple):
-    """A small sphere drawn into a picture."""
+    """A small sphere or cross drawn into a picture."""
 
     position: np.ndarray
     """(3,) [m]."""
     radius: float
     """[m]."""
     rgba: tuple[float, float, float, float]
+    shape: Literal["sphere", "cross"] = "sphere"
 
 
 class Camera:
@@ -91,15 +92,25 @@ class Camera:
         self._renderer.update_scene(data, camera, self._options)
         scene = self._renderer.scene
         for mark in marks:
-            if scene.ngeom == scene.maxgeom:
-                break
-            mujoco.mjv_initGeom(
-                scene.geoms[scene.ngeom],
-                type=mujoco.mjtGeom.mjGEOM_SPHERE,
-                size=np.full(3, mark.radius),
-                pos=np.asarray(mark.position, float),
-                mat=np.eye(3).ravel(),
-                rgba=np.asarray(mark.rgba, np.float32),
-            )
-            scene.ngeom += 1
+            for kind, size in _geoms(mark):
+                if scene.ngeom == scene.maxgeom:
+                    break
+                mujoco.mjv_initGeom(
+                    scene.geoms[scene.ngeom],
+                    type=kind,
+                    size=size,
+                    pos=np.asarray(mark.position, float),
+                    mat=np.eye(3).ravel(),
+                    rgba=np.asarray(mark.rgba, np.float32),
+                )
+                scene.ngeom += 1
         return self._renderer.render()
+
+
+def _geoms(mark: Mark) -> Iterator[tuple[mujoco.mjtGeom, np.ndarray]]:
+    """Type and size of the geoms that make a mark: one, or a cross's three bars."""
+    if mark.shape == "sphere":
+        yield mujoco.mjtGeom.mjGEOM_SPHERE, np.full(3, mark.radius)
+    else:
+        for axis in np.eye(3):
+            yield mujoco.mjtGeom.mjGEOM_BOX, mark.radius * np.where(axis, 1, 0.25)

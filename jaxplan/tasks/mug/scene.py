@@ -1,13 +1,14 @@
 """The mug scene: Panda, table, mug, target box, cameras; a model for physics, one for planning."""
 
 from importlib import resources
-from typing import Literal
+from typing import Literal, get_args
 
 import mujoco
 import numpy as np
 from numpy.typing import ArrayLike
 
 from jaxplan.scene.panda_visual import add_visuals
+from jaxplan.tasks.mug.clutter import add_clutter
 from jaxplan.tasks.mug.mug import STIFF_CONTACT, MugShape, add_mug
 
 Q_HOME = np.array([0.0, -0.35, 0.0, -2.2, 0.0, 1.85, 0.785])
@@ -20,6 +21,10 @@ BOX_INNER, BOX_WALL, BOX_HEIGHT, BOX_FLOOR = 0.085, 0.005, 0.04, 0.004
 
 IMAGE_HEIGHT, IMAGE_WIDTH = 88, 136
 
+Kind = Literal["physics", "planning"]
+Variant = Literal["plain", "cluttered"]
+"""`cluttered` has obstacles across most straight lines (`clutter`)."""
+
 PHYSICS = {"group": 3, "contype": 1, "conaffinity": 3}
 PLANNING = {"group": 4, "contype": 4, "conaffinity": 12}
 VISUAL = {"group": 2, "contype": 0, "conaffinity": 0}
@@ -27,20 +32,30 @@ VISUAL = {"group": 2, "contype": 0, "conaffinity": 0}
 
 
 def build(
-    kind: Literal["physics", "planning"] = "physics", shape: MugShape = MugShape()
+    kind: Kind = "physics",
+    shape: MugShape = MugShape(),
+    variant: Variant = "plain",
 ) -> mujoco.MjModel:
     """Compiles the scene; `kind` says whose geoms collide.
 
     What physics touches (a ring of boxes, a few hulls) is in group 3, what planning checks
     (the arm's spheres among others) in group 4, and what only the camera sees in group 2.
     """
-    return spec(kind, shape).compile()
+    return spec(kind, shape, variant).compile()
 
 
 def spec(
-    kind: Literal["physics", "planning"] = "physics", shape: MugShape = MugShape()
+    kind: Kind = "physics",
+    shape: MugShape = MugShape(),
+    variant: Variant = "plain",
 ) -> mujoco.MjSpec:
-    """The scene before compilation."""
+    """The scene before compilation.
+
+    Raises:
+        ValueError: There is no such variant.
+    """
+    if variant not in get_args(Variant):
+        raise ValueError(f"variant {variant!r}: plain or cluttered")
     panda = resources.files("jaxplan.scene") / "panda.xml"
     scene = mujoco.MjSpec.from_string(panda.read_text())
     add_visuals(scene)
@@ -54,6 +69,8 @@ def spec(
     _add_look(scene)
     _add_table(scene)
     _add_box(scene)
+    if variant == "cluttered":
+        add_clutter(scene, PHYSICS | STIFF_CONTACT, PLANNING, VISUAL)
     add_mug(scene, shape)
     _add_cameras(scene)
     fingers = [0.04, 0.04]

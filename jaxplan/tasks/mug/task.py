@@ -40,6 +40,10 @@ class MugTask:
         camera: `hand` or `static`.
         friction: Factor on all friction; 0 shows that grasps hold by friction alone.
         shape: Sizes of the mug.
+        variant: `plain`, or `cluttered` with obstacles across most straight lines.
+
+    Raises:
+        ValueError: There is no such variant.
     """
 
     def __init__(
@@ -48,10 +52,12 @@ class MugTask:
         camera: str = "hand",
         friction: float = 1.0,
         shape: MugShape = MugShape(),
+        variant: scene.Variant = "plain",
     ) -> None:
-        model = scene.build("physics", shape)
+        model = scene.build("physics", shape, variant)
         model.geom_friction *= friction
         self.model, self.shape, self.batch = model, shape, batch
+        self.variant: scene.Variant = variant
         self.sim = Simulator(model, batch)
         self.closed = np.zeros(batch, bool)
         self._camera_name = camera
@@ -59,7 +65,7 @@ class MugTask:
         self._pads = {model.geom("left_pad").id, model.geom("right_pad").id}
         self._mug_body = model.body("mug").id
         self._kinematics = InverseKinematics(model)
-        self.planning_scene = Scene.from_mjcf(scene.build("planning", shape))
+        self.planning_scene = Scene.from_mjcf(scene.build("planning", shape, variant))
         self._allowed = {
             key: self.planning_scene.ignored(names)
             for key, names in allowed_contacts().items()
