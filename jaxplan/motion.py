@@ -64,7 +64,7 @@ class MotionPlanner:
             return collision.config_free(scene, world, q, planner.margin)
 
         self._config_free = jit(config_free)
-        self._search = make_planner(
+        self.search = make_planner(
             config_free, planner, limits.q_min, limits.q_max, jit
         )
         self._offsets = _neighbours(len(limits.q_min))
@@ -102,7 +102,7 @@ class MotionPlanner:
         first = self.nearest_free(worlds, q_start)
         last = self.nearest_free(worlds, q_goal)
         result = jax.block_until_ready(
-            self._search(worlds, first, last, q_toggle, keys, draw, active)
+            self.search(worlds, first, last, q_toggle, keys, draw, active)
         )
         seconds = time.perf_counter() - began
         result = jax.tree.map(np.asarray, result)

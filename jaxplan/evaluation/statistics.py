@@ -1,6 +1,9 @@
-"""Intervals for what was counted."""
+"""Intervals for what was counted or measured."""
 
 import math
+from collections.abc import Callable
+
+import numpy as np
 
 
 def wilson(successes: int, trials: int, z: float = 1.959964) -> tuple[float, float]:
@@ -16,3 +19,31 @@ def wilson(successes: int, trials: int, z: float = 1.959964) -> tuple[float, flo
     spread = z * math.sqrt(rate * (1 - rate) / trials + z * z / (4 * trials * trials))
     scale = 1 + z * z / trials
     return (middle - spread) / scale, (middle + spread) / scale
+
+
+def bootstrap(
+    statistic: Callable[[np.ndarray], np.ndarray],
+    groups: np.ndarray,
+    resamples: int = 2000,
+    level: float = 0.95,
+) -> tuple[float, float]:
+    """Percentile interval of a statistic when whole groups are drawn again, with return.
+
+    Args:
+        statistic: Weights [R, N] of N observations to values [R]; not finite = undefined.
+        groups: [N] which group each observation belongs to, such as the episode.
+        resamples: R, drawn from a fixed seed.
+        level: Of confidence.
+
+    Returns:
+        Lower and upper end; NaN if the statistic is undefined in most resamples.
+    """
+    names, group = np.unique(groups, return_inverse=True)
+    rng = np.random.default_rng(0)
+    counts = rng.multinomial(len(names), np.full(len(names), 1 / len(names)), resamples)
+    values = np.asarray(statistic(counts[:, group]))
+    values = values[np.isfinite(values)]
+    if len(values) < resamples / 2:
+        return math.nan, math.nan
+    low, high = np.quantile(values, [(1 - level) / 2, (1 + level) / 2])
+    return float(low), float(high)

@@ -1,0 +1,207 @@
+"""One episode's planning, timed phase by phase: the upper network, banks, search.
+
+Samplers take turns at each phase, so that a busy machine slows all of them alike.
+"""
+
+import dataclasses
+import time
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jaxplan import samplers
+from jaxplan.config import PAPER_PLANNER, PlannerConfig
+from jaxplan.evaluation.study import RecordedStudy
+from jaxplan.learning import Weights
+from jaxplan.motion import MotionPlanner, jit
+from jaxplan.networks import Cond, predict
+from jaxplan.planning import Segment, Status
+from jaxplan.scene.panda import PANDA_LIMITS
+
+PROPOSALS = 100
+"""Calls for the price of one proposal."""
+
+
+UNIFORM = "uniform, 5 % goal bias"
+"""The side without a sampler."""
+
+
+class Side(NamedTuple):
+    """A sampler at a share of uniform proposals."""
+
+    name: str
+    p_uniform: float
+
+
+class Sampler:
+    """A learned sampler for one problem at a time; counts the time it takes."""
+
+    def __init__(self, weights: Weights, changes: dict[str, Any], bank: int) -> None:
+        config = dataclasses.replace(weights.config, **changes)
+
+        def draw(n: int) -> Callable:
+            @jit
+            def program(cond, keys, chunk):
+                keys = jax.vmap(jax.random.fold_in)(keys, chunk)
+                return samplers.draw(config, weights.params, cond, keys, n)
+
+            return program
+
+        self._bank, self._one = draw(bank), draw(1)
+        self.seconds = 0.0
+
+    def of(self, cond: Cond, key: jax.Array) -> Callable[[jax.Array], Segment]:
+        """The planner's `draw` for one problem."""
+
+        def draw(chunk: jax.Array) -> Segment:
+            start = time.perf_counter()
+            drawn = jax.block_until_ready(self._bank(cond, key, jnp.asarray(chunk)))
+            self.seconds += time.perf_counter() - start
+            return drawn
+
+        return draw
+
+    def proposal(self, cond: Cond, key: jax.Array) -> float:
+        """Seconds of one proposal drawn alone, median."""
+        times = []
+        for number in range(PROPOSALS + 1):
+            chunk = jnp.full(1, number, jnp.int32)
+            start = time.perf_counter()
+            jax.block_until_ready(self._one(cond, key, chunk))
+            times.append(time.perf_counter() - start)
+        return float(np.median(times[1:]))
+
+
+class Bench:
+    """Everything that is timed, compiled once.
+
+    Args:
+        study: Problems and weights.
+        sides: Names of samplers, with their weights and changes to their config.
+        p_uniform: Shares of uniform proposals at which each sampler is timed.
+        method: Of the search.
+        bank: Segments that a sampler draws at a time.
+    """
+
+    def __init__(
+        self,
+        study: RecordedStudy,
+        sides: dict[str, tuple[str, dict[str, Any]]],
+        p_uniform: tuple[float, ...],
+        method: Any,
+        bank: int,
+    ) -> None:
+        self.problems, self.keys = study.problems, study.problems.keys()
+        self.cond = study.cond
+        upper = study.upper
+        self._upper = jax.jit(
+            lambda image, q, gripper: predict(
+                upper.config, upper.params, image, q, gripper
+            )
+        )
+        found = {
+            name: (study.weights(weights), changes)
+            for name, (weights, changes) in sides.items()
+        }
+        self.samplers = {
+            name: Sampler(weights, changes, bank)
+            for name, (weights, changes) in found.items()
+            if weights is not None
+        }
+        config = dataclasses.replace(PAPER_PLANNER, method=method, lanes=1)
+        self._planners = {
+            p: _planner(study, dataclasses.replace(config, p_uniform=p))
+            for p in (*p_uniform, 1.0)
+        }
+        self.sides = [Side(n, p) for p in p_uniform for n in self.samplers]
+        self.sides.append(Side(UNIFORM, 1.0))
+        self.smoothed = self.sides[0]
+        """Of this side the whole episode is timed, smoothing included."""
+        self.first_calls: dict[str, float] = {}
+        for side in self.sides:
+            start = time.perf_counter()
+            self.plan(0, side)
+            self.first_calls[name_of(*side)] = time.perf_counter() - start
+        start = time.perf_counter()
+        self.predict(0)
+        self.first_calls["upper network"] = time.perf_counter() - start
+
+    def predict(self, row: int) -> float:
+        """Seconds of the upper network."""
+        p = self.problems
+        one = p.image[[row]], p.q[[row]], p.gripper[[row]]
+        start = time.perf_counter()
+        jax.block_until_ready(self._upper(*one))
+        return time.perf_counter() - start
+
+    def plan(self, row: int, side: Side) -> list[float]:
+        """Plans a phase.
+
+        Returns:
+            Seconds of the search with its banks, of the banks alone, of smoothing;
+            learned proposals used, and 1 where it was solved.
+        """
+        p = self.problems
+        world = jax.tree.map(lambda leaf: jnp.asarray(leaf[[row]]), p.worlds)
+        ends = p.q_start[[row]], p.q_goal[[row]], p.q_toggle[[row]]
+        key, draw = self.keys[jnp.asarray([row])], None
+        sampler = self.samplers.get(side.name)
+        if sampler is not None:
+            cond = jax.tree.map(lambda leaf: jnp.asarray(leaf[[row]]), self.cond)
+            sampler.seconds, draw = 0.0, sampler.of(cond, key)
+        motion = self._planners[side.p_uniform]
+        start = time.perf_counter()
+        if side == self.smoothed:
+            made = motion.plan(world, *ends, key, draw)
+            whole, search = time.perf_counter() - start, made.seconds
+            result = made.result
+        else:
+            result = jax.block_until_ready(motion.search(world, *ends, key, draw))
+            whole = search = time.perf_counter() - start
+        return [
+            search,
+            sampler.seconds if sampler else 0.0,
+            whole - search,
+            float(result.learned[0]),
+            float(result.status[0] == Status.SOLVED),
+        ]
+
+
+def _planner(study: RecordedStudy, config: PlannerConfig) -> MotionPlanner:
+    return MotionPlanner(study.scene, PANDA_LIMITS, config)
+
+
+def episode(bench: Bench, seed: int) -> dict[str, Any]:
+    """Sums over an episode's phases, of each side."""
+    rows = np.flatnonzero(bench.problems.seed == seed)
+    upper, sums = 0.0, {side: np.zeros(5) for side in bench.sides}
+    for row in rows.tolist():
+        upper += bench.predict(row)
+        for side in bench.sides:
+            sums[side] += bench.plan(row, side)
+    return {
+        "seed": seed,
+        "phases": len(rows),
+        "upper": upper,
+        "sides": {name_of(*side): total.tolist() for side, total in sums.items()},
+    }
+
+
+def prices(bench: Bench) -> dict[str, Any]:
+    """Seconds of one proposal of each sampler, and of the first calls."""
+    cond = jax.tree.map(lambda leaf: jnp.asarray(leaf[[0]]), bench.cond)
+    key = bench.keys[jnp.asarray([0])]
+    return {
+        "seconds_per_proposal": {
+            name: sampler.proposal(cond, key)
+            for name, sampler in bench.samplers.items()
+        },
+        "first_call_seconds": bench.first_calls,
+    }
+
+
+def name_of(sampler: str, p_uniform: float) -> str:
+    return f"{sampler}, p_uniform {p_uniform}"

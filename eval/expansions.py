@@ -1,0 +1,162 @@
+"""Table 2: tree expansions of all samplers on the same recorded problems.
+
+    python eval/expansions.py
+    python eval/expansions.py --variant cluttered --quick
+
+One proposal at a time (`workers=1`), so that counts are those of the sequential
+algorithms. Trials are the recorded episodes that ended well; a search that fails counts
+with its whole budget. Phases whose straight motion is not free are shown apart: the others
+tell nothing about a sampler.
+"""
+
+import time
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from tqdm import tqdm
+
+from jaxplan.cli import run_script
+from jaxplan.data import TOGGLES
+from jaxplan.evaluation.expansions import Counts, normalised, success
+from jaxplan.evaluation.methods import BACKBONES, METHODS, OURS, Backbone, planner
+from jaxplan.evaluation.study import RecordedStudy, StudyArgs
+from jaxplan.evaluation.tables import Result, Table
+
+AIMS = {"uniform": 2.75, "goal-biased 0.5": 1.73, "CVAE": 1.36, "conditional GAN": 1.67}
+"""Times our expansions over blocked phases, at least."""
+
+
+@dataclass(frozen=True)
+class Args(StudyArgs):
+    """Counts expansions on recorded problems."""
+
+
+class Group(NamedTuple):
+    """Some of the phases."""
+
+    name: str
+    rows: np.ndarray
+
+
+def main(args: Args) -> None:
+    """Searches, prints tables, writes JSON."""
+    start = time.perf_counter()
+    study = RecordedStudy(args)
+    problems = study.problems
+    groups = [
+        Group("all phases", np.ones(len(problems.seed), bool)),
+        Group("blocked phases", problems.blocked),
+    ]
+    tables: list[Table] = []
+    shortfalls: list[str] = []
+    bar = tqdm(total=len(BACKBONES) * len(METHODS), unit="search")
+    for backbone in BACKBONES:
+        counts: dict[str, Counts] = {}
+        for method in METHODS:
+            weights = method.weights and study.weights(method.weights)
+            if method.weights is None or weights:
+                config = planner(backbone, method)
+                answers = study.answers(config, weights or None)
+                counts[method.name] = Counts(
+                    answers.expansions, answers.solved, problems.episode
+                )
+            bar.update()
+        for group in groups:
+            tables.append(compare(backbone, group, counts))
+        tables.append(per_toggle(backbone, problems, counts))
+        shortfalls += judge(backbone, args.variant, groups[1], counts)
+    bar.close()
+    seconds = time.perf_counter() - start
+    result = Result(tables, study.settings(), shortfalls, args.quick, seconds)
+    result.show()
+    result.write(args.path("expansions"))
+    print(f"written to {args.path('expansions')}")
+
+
+def compare(backbone: Backbone, group: Group, counts: dict[str, Counts]) -> Table:
+    """All methods on some of the phases."""
+    own = counts.get(OURS)
+    rows = []
+    half = {n for n, c in counts.items() if c.solved[group.rows].mean() >= 0.5}
+    common = group.rows & np.all([counts[n].solved for n in half], axis=0)
+    for method in METHODS:
+        if method.name not in counts or own is None:
+            rows.append([method.name, "no weights", *[None] * 5, method.paper])
+            continue
+        count = counts[method.name]
+        rows.append(
+            [
+                method.name,
+                success(count, group.rows),
+                float(count.expansions[group.rows].mean()),
+                normalised(count, own, group.rows),
+                normalised(count, own, common) if method.name in half else None,
+                normalised(
+                    count, own, group.rows & count.solved, group.rows & own.solved
+                ),
+                normalised(count, own, group.rows, whole_trials=True),
+                method.paper,
+            ]
+        )
+    return Table(
+        f"{backbone.name}, {group.name} ({int(group.rows.sum())})",
+        [
+            "method",
+            "solved %",
+            "expansions",
+            "normalised, failures at N_rrt",
+            "on what all solve",
+            "successes only",
+            "whole trials that succeed",
+            "paper",
+        ],
+        rows,
+        f"{backbone.note} All solve {int(common.sum())} of these phases (rows that "
+        "solve less than half left out).",
+    )
+
+
+def per_toggle(backbone: Backbone, problems, counts: dict[str, Counts]) -> Table:
+    """Mean expansions by the toggle that comes next; blocked phases, failures at N_rrt."""
+    groups = [
+        Group(f"{name}{' blocked' if blocked else ''}", rows)
+        for blocked in (False, True)
+        for index, name in enumerate(TOGGLES)
+        if (rows := (problems.toggle == index) & (problems.blocked | (not blocked)))
+        is not None
+    ]
+    rows = []
+    for name, count in counts.items():
+        means = [
+            float(count.expansions[g.rows].mean()) if g.rows.any() else None
+            for g in groups
+        ]
+        rows.append([name, *means])
+    return Table(
+        f"{backbone.name}, expansions of a phase by the toggle it leads to",
+        ["method", *(f"{g.name} ({int(g.rows.sum())})" for g in groups)],
+        rows,
+    )
+
+
+def judge(
+    backbone: Backbone, variant: str, group: Group, counts: dict[str, Counts]
+) -> list[str]:
+    """Where a method needs fewer expansions, in relation to ours, than the aim says."""
+    if OURS not in counts or not group.rows.any():
+        return []
+    lines = []
+    for name, count in counts.items():
+        ratio = normalised(count, counts[OURS], group.rows).value
+        aim = next((a for n, a in AIMS.items() if name.startswith(n)), 1.0)
+        if name != OURS and not ratio >= aim:
+            lines.append(
+                f"{backbone.name}, {variant}, blocked phases: {name} needs "
+                f"{ratio:.2f} of our expansions (aim {aim})"
+            )
+    return lines
+
+
+if __name__ == "__main__":
+    run_script(main, Args)

@@ -1,0 +1,245 @@
+"""Writes RESULTS.md from the JSON files in `eval/results/`: no figure is typed by hand.
+
+    python eval/report.py
+
+A file that is not there is a line that says which command makes it.
+"""
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from jaxplan.cli import run_script
+from jaxplan.data import write_atomic
+from jaxplan.evaluation.tables import Estimate, Table, markdown, table
+
+ROOT = Path(__file__).parents[1]
+RESULTS = Path(__file__).parent / "results"
+
+
+class Section(NamedTuple):
+    """A heading, the files whose tables stand under it, and what differs from the paper."""
+
+    title: str
+    files: tuple[str, ...]
+    command: str
+    """Makes the files; the JSON says what was really run."""
+    differs: str
+
+
+SECTIONS = (
+    Section(
+        "Table 1, our row, and Table 5, nominal: success and toggle error",
+        ("success", "success_cluttered"),
+        "python eval/success.py --seeds 200000:200300 --out eval/results/success.json",
+        "The imitation policies of Table 1 are not built yet. MuJoCo in place of PyBullet, our own "
+        "mug, grasps that hold by friction alone. The paper's toggle error is to the nearest "
+        "toggle of the episode; the stricter one is to the toggle that comes next, L2 over the "
+        "joints.",
+    ),
+    Section(
+        "Table 2: normalised RRT expansions",
+        ("expansions_plain", "expansions_cluttered"),
+        "python eval/expansions.py --variant plain",
+        "The paper does not say which backbone its counts are from, what happens near the goal, "
+        "nor how long the steps of the classical planners are. Here every row of a backbone has "
+        "the same steps (0.05 to 0.2 rad), goal tests and budget (N_rrt = 500 a phase), and each "
+        "backbone is a table of its own. Trials are episodes that the upper network and a uniform "
+        "planner drove to success: no learned sampler had a part in posing the problems. The paper "
+        "averages over successful episodes; that hides failures, so failures with the whole budget "
+        "stand beside it. A single tree of uniform samples without any goal bias does not find a "
+        "goal in 7 dimensions, so the paper's 2.75 must come from another rule: it stands at both "
+        "uniform rows.",
+    ),
+    Section(
+        "Table 3: time of one proposal",
+        ("proposal_time",),
+        "python eval/proposal_time.py",
+        "Batch 1, planner excluded, as in the paper, and beside it what the planner really pays: "
+        "segments drawn many at a time.",
+    ),
+    Section(
+        "Table 4: time to first solution of an episode",
+        ("ttfs_plain", "ttfs_rrt_plain", "ttfs_cluttered", "ttfs_rrt_cluttered"),
+        "python eval/ttfs.py --variant plain",
+        "Two CPU cores that other work shared, in place of the paper's unnamed machine; sides "
+        "take turns at each phase, so that ratios hold. Segments come in banks, drawn when a "
+        "search asks for the first; the paper draws one proposal at a time, whose price is the "
+        "column of that name.",
+    ),
+    Section(
+        "Ablations",
+        ("ablations_plain", "ablations_cluttered"),
+        "python eval/ablations.py --variant plain",
+        "The paper has T = 10 beside T = 25 and gives no other ablation.",
+    ),
+    Section(
+        "Speed beside MuJoCo, OMPL, PyBullet and PyTorch",
+        ("benchmark", "motion_bench"),
+        "python eval/benchmark.py --update-baseline",
+        "Not in the paper. Both sides of a ratio were measured in one run on one machine.",
+    ),
+)
+PAPER = {"success": (95.67, 96.0, 0.0112)}
+"""Success of Table 1 and of Table 5 [%], toggle error of Table 5 [rad]."""
+FIGURES = {
+    "figure2.png": "Figure 2: proposals (blue) on the way to a grasp and to a release.",
+    "figure3.png": "Figure 3: one episode.",
+    "figure4.png": "Figure 4: three initial poses.",
+    "figure5.png": "Figure 5: diffusion, CVAE and conditional GAN side by side.",
+}
+
+
+@dataclass(frozen=True)
+class Args:
+    """Writes RESULTS.md."""
+
+    results: Path = RESULTS
+    out: Path = ROOT / "RESULTS.md"
+
+
+def main(args: Args) -> None:
+    """Writes the page."""
+    write_atomic(args.out, report(args.results).encode())
+    print(f"written to {args.out}")
+
+
+def report(results: Path = RESULTS, root: Path = ROOT) -> str:
+    """The page as text."""
+    found = {
+        name: json.loads(path.read_text(encoding="utf-8"))
+        for section in SECTIONS
+        for name in section.files
+        if (path := results / f"{name}.json").is_file()
+    }
+    parts = [
+        "# Results\n",
+        "Made by `python eval/report.py` from `eval/results/*.json`. A figure in brackets is a "
+        "95 % interval. Paper: Lee and Cho, Electronics 2025, 14, 4837.\n",
+        _worse(found),
+    ]
+    for section in SECTIONS:
+        parts.append(f"## {section.title}\n\n{section.differs}\n")
+        present = [name for name in section.files if name in found]
+        if not present:
+            parts.append(f"Not measured: `{section.command}`.\n")
+        for name in present:
+            parts.append(_origin(name, found[name]))
+            parts += [f"**{t.title}**\n\n{markdown(t)}" for t in tables(found[name])]
+    pictures = [
+        f"![{caption}](docs/figures/{name})\n\n{caption}\n"
+        for name, caption in FIGURES.items()
+        if (root / "docs" / "figures" / name).is_file()
+    ]
+    if pictures:
+        parts += ["## Figures 2 to 5\n\nMade by `python eval/figures.py`.\n", *pictures]
+    return "\n".join(parts)
+
+
+def tables(result: dict[str, Any]) -> list[Table]:
+    """The tables of any script's JSON."""
+    if "tables" in result:
+        return [table(content) for content in result["tables"]]
+    if "success_rate" in result:
+        return _success(result)
+    parts = result.get("parts") or {"": result}
+    return [_rows(title, part) for title, part in parts.items() if part.get("rows")]
+
+
+def _success(result: dict[str, Any]) -> list[Table]:
+    """Of `eval/success.py`."""
+    low, high = result["wilson_95"]
+    success, nominal, error = PAPER["success"]
+    rate = Estimate(100 * result["success_rate"], 100 * low, 100 * high)
+    title = f"success over {result['trials']} episodes, and toggle error"
+    rows: list[list[Any]] = [
+        ["success, % (Table 1)", rate, success],
+        ["success, % (Table 5, nominal)", rate, nominal],
+    ]
+    if toggles := result.get("toggle_error"):
+        rows += [
+            [
+                "toggle error to the nearest [rad]",
+                toggles["nearest_toggle_mean"],
+                error,
+            ],
+            ["toggle error to the next, mean [rad]", toggles["mean"], None],
+            ["toggle error to the next, median [rad]", toggles["median"], None],
+        ]
+        rows += [
+            [f"{name}, median [rad]", row["median"], None]
+            for name, row in toggles["per_toggle"].items()
+        ]
+    return [Table(title, ["", "ours", "paper"], rows)]
+
+
+def _rows(title: str, part: dict[str, Any]) -> Table:
+    """Of the benchmark and its like (`rows.py`)."""
+    rows = [
+        [
+            row["scene"],
+            row["side"],
+            row["note"] or "-"
+            if row["median"] is None
+            else _estimate(row["median"], row["p10"], row["p90"]),
+            row["unit"],
+        ]
+        for row in part["rows"]
+    ]
+    ratios = [
+        f"{name}: {ratio['value'] if isinstance(ratio, dict) else ratio:.3g}"
+        for name, ratio in part.get("ratios", {}).items()
+    ]
+    note = "Median, 10th and 90th percentile." + "".join(f"\n- {r}" for r in ratios)
+    return Table(title, ["scene", "side", "median", "unit"], rows, note)
+
+
+def _estimate(median: float, low: float | None, high: float | None) -> str:
+    """Three significant digits, whatever the size."""
+    if low is None or high is None:
+        return f"{median:.3g}"
+    return f"{median:.3g} ({low:.3g} to {high:.3g})"
+
+
+def _origin(name: str, result: dict[str, Any]) -> str:
+    """Command, date, machine, and what the run says of itself."""
+    versions = result.get("versions", {})
+    settings = result.get("settings", {})
+    said = [
+        f"`{result['command']}`" if result.get("command") else f"`{name}.json`",
+        result.get("date", ""),
+        versions.get("machine", ""),
+        f"jaxplan {versions['jaxplan']}" if "jaxplan" in versions else "",
+        "quick run" if result.get("quick") else "",
+    ]
+    if "seeds" in settings:
+        said.append(f"seeds {settings['seeds']}")
+    if "phases" in settings:
+        said.append(
+            f"{settings['successful_trials']} of {settings['trials']} trials successful, "
+            f"{settings['phases']} phases, {100 * settings['blocked_share']:.1f} % of them "
+            f"blocked, targets by the {settings['upper']}"
+        )
+    return "; ".join(filter(None, said)) + "\n"
+
+
+def _worse(found: dict[str, dict]) -> str:
+    """Where ours is worse than the paper or short of its aim."""
+    lines = [line for result in found.values() for line in result.get("shortfalls", [])]
+    for name in ("success",):
+        if name in found:
+            result, (success, _, error) = found[name], PAPER[name]
+            if 100 * result["success_rate"] < success:
+                rate = 100 * result["success_rate"]
+                lines.append(f"success {rate:.1f} % (paper {success})")
+            toggles = result.get("toggle_error") or {}
+            if (mean := toggles.get("nearest_toggle_mean", 0)) > error:
+                lines.append(f"toggle error {mean:.4f} rad (paper {error})")
+    heading = "## Where ours is worse, or short of its aim\n\n"
+    body = "\n".join(f"- {line}" for line in lines) or "Nowhere in what is below."
+    return heading + body + "\n"
+
+
+if __name__ == "__main__":
+    run_script(main, Args)

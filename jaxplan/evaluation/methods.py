@@ -1,0 +1,79 @@
+"""The methods of the paper's Table 2, and the backbones in which they are compared.
+
+Within a backbone all rows have the same steps, step lengths, goal tests and budget: they
+differ in where proposals come from, and in nothing else.
+"""
+
+import dataclasses
+from typing import Any, NamedTuple
+
+from jaxplan.config import PAPER_PLANNER, PlannerConfig
+
+
+class Method(NamedTuple):
+    """A row of Table 2."""
+
+    name: str
+    weights: str | None = None
+    """Of the learned sampler (`load_weights`); None = uniform proposals."""
+    goal_bias: float | None = None
+    """Of the uniform proposals; None = the backbone's."""
+    paper: float | None = None
+    """Expansions normalised to ours, Table 2."""
+
+
+class Backbone(NamedTuple):
+    """An RRT for all rows."""
+
+    name: str
+    planner: dict[str, Any]
+    note: str
+
+
+OURS = "ours (diffusion, DDIM-25)"
+METHODS = (
+    Method(OURS, "sampler", paper=1.0),
+    Method("few-step", "few_step"),
+    Method("CVAE", "cvae", paper=1.36),
+    Method("conditional GAN", "gan", paper=1.67),
+    Method("uniform, no goal bias", None, 0.0, 2.75),
+    Method("uniform, 5 % goal bias", None, 0.05, 2.75),
+    Method("goal-biased 0.5", None, 0.5, 1.73),
+    Method("goal-biased 0.8", None, 0.8),
+)
+BACKBONES = (
+    Backbone(
+        "rrt_connect",
+        {"method": "rrt_connect"},
+        "RRT-Connect. The first thing that every row tries is the straight motion.",
+    ),
+    Backbone(
+        "rrt",
+        {"method": "rrt"},
+        "One tree. A node within 0.3 rad of the goal tries the straight motion there, "
+        "in every row.",
+    ),
+    Backbone(
+        "literal",
+        {
+            "method": "rrt",
+            "goal_connect": 0.0,
+            "goal_bias": 0.0,
+            "uniform_mode": "independent",
+        },
+        "Algorithm 1 to the letter: one tree, no straight motion to the goal, uniform "
+        "segments whose direction is independent of the sample.",
+    ),
+)
+
+
+def planner(backbone: Backbone, method: Method, **changes: Any) -> PlannerConfig:
+    """Settings of a method in a backbone; without a sampler all proposals are uniform."""
+    settings = dict(backbone.planner)
+    if method.weights is None:
+        # A classical baseline steers toward its sample: the letter's uniform segments
+        # are part of the mixture.
+        settings |= {"p_uniform": 1.0, "uniform_mode": "toward"}
+    if method.goal_bias is not None:
+        settings["goal_bias"] = method.goal_bias
+    return dataclasses.replace(PAPER_PLANNER, **(settings | changes))

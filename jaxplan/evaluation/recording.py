@@ -1,0 +1,186 @@
+"""Recording phase problems: the networks predict, a uniform planner drives.
+
+No learned sampler has a part in it, so that none is favoured; the upper network is the one
+that all of them serve (section 5.5: "we replace only the lower planner while keeping the
+upper network fixed"). Where a scene has no upper network, the expert predicts.
+"""
+
+import dataclasses
+import itertools
+from collections.abc import Callable, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Literal
+
+import jax
+import numpy as np
+
+from jaxplan import collision
+from jaxplan.collision import World
+from jaxplan.config import PAPER_PLANNER, DemonstrationConfig, PlannerConfig
+from jaxplan.evaluation import problems as store
+from jaxplan.evaluation.problems import Problems
+from jaxplan.learning import Weights
+from jaxplan.motion import MotionPlanner, jit
+from jaxplan.networks import predict
+from jaxplan.rollout import Phase, Predict, Targets, rollout
+from jaxplan.scene.panda import PANDA_LIMITS
+from jaxplan.tasks.mug.demonstrate import ExpertPolicy
+from jaxplan.tasks.mug.scene import Variant
+from jaxplan.tasks.mug.task import MugTask
+
+SHARD = 32
+"""Episodes a shard, in lockstep."""
+UNIFORM = dataclasses.replace(PAPER_PLANNER, p_uniform=1.0)
+Upper = Literal["network", "expert"]
+
+
+def record(
+    variant: Variant,
+    seeds: range,
+    predictor: Weights | None,
+    directory: Path = Path("runs/problems"),
+    progress: Callable[[int], object] = lambda done: None,
+) -> tuple[Problems, str]:
+    """The problems of one episode per seed; those that are not there yet are made.
+
+    Args:
+        variant: Of the scene.
+        seeds: As many as fill shards of 32; more are recorded otherwise, and left out.
+        predictor: The upper network; None = the expert predicts.
+        directory: Each variant and predictor has its own inside.
+        progress: Called with the number of episodes of each shard.
+
+    Returns:
+        The problems, and a name that stands for them.
+    """
+    upper = "expert" if predictor is None else predictor.info["sha256"]
+    name = f"{variant}-{upper[:8]}"
+    settings = {"variant": variant, "upper": upper, "shard": SHARD}
+    first, end = seeds.start // SHARD, -(-seeds.stop // SHARD)
+    names = [f"problems_{index:06d}.npz" for index in range(first, end)]
+    there = store.begin(directory / name, settings)
+    recorder = None
+    for index, shard in zip(range(first, end), names, strict=True):
+        if shard not in there:
+            recorder = recorder or Recorder(variant, predictor)
+            part = recorder.run(range(index * SHARD, (index + 1) * SHARD))
+            store.add(directory / name, shard, part)
+        progress(SHARD)
+    found = store.read(directory / name, names)
+    rows = (seeds.start <= found.seed) & (found.seed < seeds.stop)
+    return found.take(np.flatnonzero(rows)), name
+
+
+class Recorder:
+    """Runs episodes and keeps the problems that they pose.
+
+    Args:
+        variant: Of the scene.
+        predictor: The upper network; None = the expert predicts.
+        planner: Who drives.
+    """
+
+    def __init__(
+        self,
+        variant: Variant,
+        predictor: Weights | None,
+        planner: PlannerConfig = UNIFORM,
+    ) -> None:
+        self._task = MugTask(SHARD, variant=variant)
+        scene = self._task.planning_scene
+        self._planner = MotionPlanner(scene, PANDA_LIMITS, planner)
+        self._policy = ExpertPolicy(self._task, DemonstrationConfig(noisy_episodes=0))
+        self._predict: Predict = self._expert
+        if predictor is not None:
+            self._predict = partial(_network, _upper(predictor))
+        points = collision.points_for(1.0, planner.edge_resolution)
+        self._free = jit(
+            lambda worlds, q0, q1: collision.motion_free(
+                scene, worlds, q0, q1, points, planner.margin
+            )
+        )
+        self._rows: list[tuple] = []
+
+    def run(self, seeds: Sequence[int]) -> Problems:
+        """Problems of at most `SHARD` episodes."""
+        self._seeds, self._rows = seeds, []
+        self._toggles = np.zeros(len(seeds), int)
+        self._closed = np.zeros(len(seeds), bool)
+        self._policy.reset(seeds)
+        records = rollout(
+            self._task, seeds, self._predict, self._planner, listen=self._listen
+        )
+        columns = [np.array(column) for column in zip(*self._rows, strict=True)]
+        order = np.lexsort((columns[1], columns[0]))
+        seed, phase, *others = (column[order] for column in columns)
+        well = [record.seed for record in records if record.success]
+        return Problems(seed, phase, np.isin(seed, well), *others)
+
+    def _expert(self, observation, episodes: list[int]) -> Targets:
+        return Targets(*self._policy(observation, episodes))
+
+    def _listen(self, phase: Phase) -> None:
+        """Keeps a round's problems, but those of hands that back off for good."""
+        targets, observation = phase.targets, phase.observation
+        q = np.zeros((2, SHARD, observation.q.shape[1]), np.float32)
+        q[:, phase.episodes] = observation.q, targets.q_goal
+        start, goal = (self._planner.nearest_free(phase.worlds, ends) for ends in q)
+        free = self._straight(phase.worlds, start, goal)
+        worlds = jax.tree.map(np.asarray, phase.worlds)
+        for row, e in enumerate(phase.episodes):
+            closed = bool(observation.gripper[row])
+            self._toggles[e] += closed != self._closed[e]
+            self._closed[e] = closed
+            if e in phase.leaving:
+                continue
+            self._rows.append(
+                (
+                    np.int32(self._seeds[e]),
+                    np.int32(phase.number),
+                    np.int8(self._toggles[e] % 4),
+                    bool(phase.last[row]),
+                    not free[e],
+                    start[e],
+                    goal[e],
+                    targets.q_toggle[row].astype(np.float32),
+                    np.uint8(targets.gripper_toggle[row]),
+                    observation.image[row],
+                    observation.q[row].astype(np.float32),
+                    np.uint8(closed),
+                    targets.q_goal[row].astype(np.float32),
+                    *(leaf[e] for leaf in worlds),
+                )
+            )
+
+    def _straight(self, worlds: World, q0: np.ndarray, q1: np.ndarray) -> np.ndarray:
+        """[B] whether the straight motions are free, in pieces of at most 1 rad."""
+        length = np.linalg.norm(q1 - q0, axis=1)
+        pieces = int(np.ceil(max(length.max(), 1e-6)))
+        ends = np.linspace(0, 1, pieces + 1, dtype=np.float32)
+        free = np.ones(len(q0), bool)
+        for low, high in itertools.pairwise(ends):
+            part = (q0 + share * (q1 - q0) for share in (low, high))
+            free &= np.asarray(self._free(worlds, *part))
+        return free
+
+
+def _upper(predictor: Weights) -> Callable:
+    """The upper network for `SHARD` lanes, compiled once."""
+
+    @jax.jit
+    def upper(image, q, gripper):
+        return predict(predictor.config, predictor.params, image, q, gripper)[0]
+
+    return upper
+
+
+def _network(upper: Callable, observation, episodes: list[int]) -> Targets:
+    padded = []
+    for column in observation:
+        full = np.zeros((SHARD, *column.shape[1:]), column.dtype)
+        full[episodes] = column
+        padded.append(full)
+    subgoal = upper(*padded)
+    rows = (subgoal.q_toggle, subgoal.gripper_toggle, subgoal.q_goal)
+    return Targets(*(np.asarray(column)[episodes] for column in rows))
