@@ -2,12 +2,21 @@
 
     python -m jaxplan.train predictor --config configs/debug.py --data DIR
     python -m jaxplan.train sampler --config configs/debug.py --data DIR
+    (cvae, gan and few_step likewise, the last one after the sampler)
 
 Seconds. Expected: the loss falls.
 """
 
+from typing import Any
+
 from jaxplan.config import (
+    CvaeConfig,
+    CvaeTraining,
     EncoderConfig,
+    FewStepConfig,
+    FewStepTraining,
+    GanConfig,
+    GanTraining,
     OptimizerConfig,
     PredictorConfig,
     PredictorTraining,
@@ -31,18 +40,45 @@ predictor = PredictorTraining(
     checkpoint_every=10,
 )
 
+few: dict[str, Any] = {
+    "steps": 20,
+    "batch_size": 16,
+    "optimizer": OptimizerConfig(learning_rate=1e-3),
+    "log_every": 5,
+    "validate_every": 10,
+    "checkpoint_every": 10,
+    "val_problems": 4,
+    "val_segments": 4,
+    "predictor": "runs/debug_predictor/weights",
+}
+
 sampler = SamplerTraining(
     name="debug_sampler",
-    predictor="runs/debug_predictor/weights",
     network=SamplerConfig(
         denoiser="film_mlp", hidden=(32, 32), encoder=None, relative=True
     ),
-    steps=20,
-    batch_size=16,
-    optimizer=OptimizerConfig(learning_rate=1e-3),
-    log_every=5,
-    validate_every=10,
-    checkpoint_every=10,
-    val_problems=4,
-    val_segments=4,
+    **few,
+)
+
+few_step = FewStepTraining(
+    name="debug_few_step",
+    network=FewStepConfig(
+        denoiser="film_mlp", hidden=(32, 32), encoder=None, relative=True
+    ),
+    teacher="runs/debug_sampler/weights",
+    **few,
+)
+
+cvae = CvaeTraining(
+    name="debug_cvae",
+    network=CvaeConfig(hidden=(32, 32), encoder=None, relative=True),
+    **few,
+)
+
+gan = GanTraining(
+    name="debug_gan",
+    network=GanConfig(
+        generator=(32, 32), discriminator=(32, 32), encoder=None, relative=True
+    ),
+    **few,
 )

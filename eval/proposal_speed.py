@@ -13,7 +13,7 @@ from turns import Side, compiled, take_turns
 
 from jaxplan.config import SamplerConfig
 from jaxplan.networks import Cond, SamplerNetwork
-from jaxplan.samplers.diffusion import draw
+from jaxplan.samplers import draw
 
 PART = "proposals"
 SCENE = "DDIM-25, U-Net 64/128/256"

@@ -1,13 +1,14 @@
 """The diffusion sampler in PyTorch, as it is usually run: one proposal at a time.
 
-The network has the layers of `jaxplan.networks` (Diffusion Policy's ConditionalUnet1D and
-the noise step's encoding) and random weights. The condition's vector is given: its image
-is encoded once a phase, whoever samples. Needs the package `torch`.
+The network has the layers of `jaxplan.networks` (Diffusion Policy's ConditionalUnet1D or the
+FiLM-MLP, and the noise step's encoding) and random weights. The condition's vector is given:
+its image is encoded once a phase, whoever samples. Needs the package `torch`.
 """
 
 import numpy as np
 import torch  # pyright: ignore[reportMissingImports]
 from torch import nn  # pyright: ignore[reportMissingImports]
+from torch.nn.functional import mish  # pyright: ignore[reportMissingImports]
 
 from jaxplan import diffusion
 from jaxplan.config import SamplerConfig
@@ -43,21 +44,11 @@ class Level(nn.Module):
         return self.second(self.first(h, cond), cond)
 
 
-class TorchSampler(nn.Module):
-    """eps_theta(x_t, t, cond), and segments from it."""
+class UNet(nn.Module):
+    """Diffusion Policy's ConditionalUnet1D over the 8 numbers of a segment."""
 
-    rates: torch.Tensor
-
-    def __init__(self, config: SamplerConfig, kernel: int = 3) -> None:
+    def __init__(self, hidden: tuple[int, ...], cond: int, kernel: int = 3) -> None:
         super().__init__()
-        self.config, hidden = config, config.hidden
-        features = config.step_features
-        cond = features + config.cond_features
-        self.step = nn.Sequential(
-            nn.Linear(features, 4 * features),
-            nn.Mish(),
-            nn.Linear(4 * features, features),
-        )
         self.down = nn.ModuleList(
             Level(above, width, kernel, cond)
             for above, width in zip((1, *hidden), hidden, strict=False)
@@ -77,17 +68,9 @@ class TorchSampler(nn.Module):
         self.end = nn.Sequential(
             conv_block(hidden[0], hidden[0], kernel), nn.Conv1d(hidden[0], 1, 1)
         )
-        half = features // 2
-        rates = torch.exp(-np.log(10000.0) * torch.arange(half) / (half - 1))
-        self.register_buffer("rates", rates)
 
-    def forward(
-        self, x_t: torch.Tensor, t: torch.Tensor, cond: torch.Tensor
-    ) -> torch.Tensor:
-        """eps [B, 8] for x_t [B, 8], t [B] and conditions [B, C]."""
-        angles = t[:, None] * self.rates
-        step = self.step(torch.cat([angles.sin(), angles.cos()], dim=-1))
-        cond = torch.cat([step, cond], dim=-1)
+    def forward(self, x_t: torch.Tensor, cond: torch.Tensor) -> torch.Tensor:
+        """eps [B, 8] for x_t [B, 8] and conditions with their noise steps [B, C]."""
         h, skips = x_t[:, None], []
         for index, level in enumerate(self.down):
             h = level(h, cond)
@@ -98,6 +81,63 @@ class TorchSampler(nn.Module):
         for level, upsample in zip(self.up, self.upsample, strict=True):
             h = upsample(level(torch.cat([h, skips.pop()], dim=1), cond))
         return self.end(h)[:, 0]
+
+
+class FilmMlp(nn.Module):
+    """Residual blocks of one width, each modulated by (1 + scale) and a shift."""
+
+    def __init__(self, hidden: tuple[int, ...], cond: int, outputs: int) -> None:
+        super().__init__()
+        width, blocks = hidden[0], range(len(hidden))
+        self.begin = nn.Linear(outputs, width)
+        self.norm = nn.ModuleList(nn.LayerNorm(width, 1e-6) for _ in blocks)
+        self.first = nn.ModuleList(nn.Linear(width, width) for _ in blocks)
+        self.film = nn.ModuleList(nn.Linear(cond, 2 * width) for _ in blocks)
+        self.second = nn.ModuleList(nn.Linear(width, width) for _ in blocks)
+        self.end = nn.Sequential(
+            nn.LayerNorm(width, 1e-6), nn.Mish(), nn.Linear(width, outputs)
+        )
+
+    def forward(self, x_t: torch.Tensor, cond: torch.Tensor) -> torch.Tensor:
+        """As `UNet.forward`."""
+        h, cond = self.begin(x_t), mish(cond)
+        blocks = zip(self.norm, self.first, self.film, self.second, strict=True)
+        for norm, first, film, second in blocks:
+            scale, shift = film(cond).chunk(2, dim=1)
+            h = h + second(mish((1 + scale) * first(norm(h)) + shift))
+        return self.end(h)
+
+
+class TorchSampler(nn.Module):
+    """eps_theta(x_t, t, cond), and segments from it."""
+
+    rates: torch.Tensor
+
+    def __init__(self, config: SamplerConfig) -> None:
+        super().__init__()
+        self.config = config
+        features, outputs = config.step_features, len(config.q_min) + 1
+        cond = features + config.cond_features
+        self.step = nn.Sequential(
+            nn.Linear(features, 4 * features),
+            nn.Mish(),
+            nn.Linear(4 * features, features),
+        )
+        if config.denoiser == "unet1d":
+            self.denoiser = UNet(config.hidden, cond)
+        else:
+            self.denoiser = FilmMlp(config.hidden, cond, outputs)
+        half = features // 2
+        rates = torch.exp(-np.log(10000.0) * torch.arange(half) / (half - 1))
+        self.register_buffer("rates", rates)
+
+    def forward(
+        self, x_t: torch.Tensor, t: torch.Tensor, cond: torch.Tensor
+    ) -> torch.Tensor:
+        """eps [B, 8] for x_t [B, 8], t [B] and conditions [B, C]."""
+        angles = t[:, None] * self.rates
+        step = self.step(torch.cat([angles.sin(), angles.cos()], dim=-1))
+        return self.denoiser(x_t, torch.cat([step, cond], dim=-1))
 
     @torch.inference_mode()
     def draw(self, cond: torch.Tensor) -> np.ndarray:

@@ -7,12 +7,13 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from jaxplan import samplers
+from jaxplan.config import SamplerConfig
 from jaxplan.learning import Weights
 from jaxplan.motion import jit
 from jaxplan.networks import Cond, predict
 from jaxplan.planning import Segment
 from jaxplan.rollout import Targets
-from jaxplan.samplers import diffusion
 
 BANK = 32
 """Learned segments drawn at a time for a phase; a search that uses them up gets as many more."""
@@ -27,7 +28,10 @@ class Agent:
         predictor: Weights of the upper network.
         sampler: Weights of the sampler that was trained on its features.
         batch: Lanes of the outer loop.
-        inference_steps: DDIM steps; None takes the sampler's own number.
+        inference_steps: Denoising steps; None takes the sampler's own number.
+
+    Raises:
+        ValueError: `inference_steps` for a sampler that has no steps.
     """
 
     def __init__(
@@ -41,6 +45,10 @@ class Agent:
         self._features = np.zeros((batch, 0), np.float32)
         config = sampler.config
         if inference_steps is not None:
+            if not isinstance(config, SamplerConfig):
+                raise ValueError(
+                    f"inference_steps {inference_steps}: {type(config).__name__} has none"
+                )
             config = dataclasses.replace(config, num_inference_steps=inference_steps)
         self._own_encoder = config.encoder is not None
 
@@ -51,7 +59,7 @@ class Agent:
         @jit
         def segments(cond, keys, chunk):
             keys = jax.vmap(jax.random.fold_in)(keys, chunk)
-            return diffusion.draw(config, sampler.params, cond, keys, BANK)
+            return samplers.draw(config, sampler.params, cond, keys, BANK)
 
         self.upper, self.segments = upper, segments
 

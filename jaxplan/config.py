@@ -146,6 +146,27 @@ class EncoderConfig:
     features: int = 64
     average: bool = False
     """Adds a projection of the global average: whether and how big, beside where."""
+    scales: int = 1
+    """Stages whose maps are summed before the spatial softmax, at the finest one's resolution."""
+
+
+@dataclass(frozen=True)
+class HandCameraConfig:
+    """How the hand's camera is mounted on a Panda, and what plane its rays are cut with."""
+
+    position: tuple[float, float, float] = (-0.065, 0.0, 0.0)
+    """In the hand's frame [m]."""
+    tilt: float = -0.12
+    """About the hand's y, from straight ahead [rad]."""
+    fovy: float = 50.0
+    """Vertical field of view [deg]."""
+    aspect: float = 136 / 88
+    plane: float = 0.04
+    """Height above the table: the axis of a mug that lies there [m]."""
+    centre: tuple[float, float] = (0.47, 0.0)
+    """Middle of what is looked at [m]."""
+    scale: float = 0.15
+    """Half of its extent [m]."""
 
 
 @dataclass(frozen=True)
@@ -153,6 +174,8 @@ class PredictorConfig:
     """The upper network F_psi (section 4.2)."""
 
     encoder: EncoderConfig = EncoderConfig()
+    camera: HandCameraConfig | None = None
+    """Adds where on the table the keypoints lie, by way of the joints; None = as in the paper."""
     state_features: int = 64
     hidden: int = 256
     dropout: float = 0.1
@@ -161,25 +184,58 @@ class PredictorConfig:
 
 
 @dataclass(frozen=True)
-class SamplerConfig:
-    """The diffusion sampler D_theta (section 4.3)."""
+class SegmentConfig:
+    """What all learned samplers have in common: what they see, and what a segment is."""
 
-    denoiser: Literal["unet1d", "film_mlp"] = "unet1d"
-    hidden: tuple[int, ...] = (64, 128, 256)
-    """U-Net: channels of each level. FiLM-MLP: width of each block."""
     encoder: EncoderConfig | None = EncoderConfig()
     """None: the condition holds the predictor's image features, frozen."""
     cond_features: int = 256
-    step_features: int = 128
     relative: bool = False
     """Adds q_toggle - q_curr and q_goal - q_curr [rad] to the condition's input."""
-    num_train_timesteps: int = 100
-    num_inference_steps: int = 25
     step_min: float = 0.05
     step_max: float = 0.2
     """s in [step_min, step_max] [rad]."""
     q_min: tuple[float, ...] = PANDA_Q_MIN
     q_max: tuple[float, ...] = PANDA_Q_MAX
+
+
+@dataclass(frozen=True)
+class SamplerConfig(SegmentConfig):
+    """The diffusion sampler D_theta (section 4.3)."""
+
+    denoiser: Literal["unet1d", "film_mlp"] = "unet1d"
+    hidden: tuple[int, ...] = (64, 128, 256)
+    """U-Net: channels of each level. FiLM-MLP: width of each block."""
+    step_features: int = 128
+    num_train_timesteps: int = 100
+    num_inference_steps: int = 25
+
+
+@dataclass(frozen=True)
+class FewStepConfig(SamplerConfig):
+    """The diffusion sampler's noise-to-segment map in 1 to 4 steps, learned from it."""
+
+    num_inference_steps: int = 1
+    noisiest: int = 96
+    """Noise step from which x_T starts, as the teacher's: DDIM-25 begins there."""
+
+
+@dataclass(frozen=True)
+class CvaeConfig(SegmentConfig):
+    """The conditional VAE of Ichter, Harrison and Pavone, over segments."""
+
+    latent: int = 3
+    hidden: tuple[int, ...] = (512, 512)
+    """Of the recognition network and of the decoder."""
+
+
+@dataclass(frozen=True)
+class GanConfig(SegmentConfig):
+    """Conditional GAN over segments. The paper gives no architecture."""
+
+    latent: int = 16
+    generator: tuple[int, ...] = (512, 512, 512)
+    discriminator: tuple[int, ...] = (512, 512)
 
 
 @dataclass(frozen=True)
@@ -229,7 +285,7 @@ class AugmentConfig:
 
 @dataclass(frozen=True, kw_only=True)
 class TrainConfig:
-    """What both trainings have in common."""
+    """What all trainings have in common."""
 
     name: str
     """The run's directory under `runs/`."""
@@ -261,11 +317,10 @@ class PredictorTraining(TrainConfig):
 
 
 @dataclass(frozen=True, kw_only=True)
-class SamplerTraining(TrainConfig):
-    """`python -m jaxplan.train sampler`."""
+class SegmentTraining(TrainConfig):
+    """What the trainings of all learned samplers have in common."""
 
-    name: str = "sampler"
-    network: SamplerConfig = SamplerConfig()
+    network: SegmentConfig
     predictor: str = "jaxplan/pretrained"
     """Directory with the predictor's weights; read where the sampler has no encoder."""
     target_noise: float = 0.02
@@ -274,6 +329,49 @@ class SamplerTraining(TrainConfig):
     val_problems: int = 64
     val_segments: int = 32
     """Validation draws `val_segments` segments for each of `val_problems` conditions."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class SamplerTraining(SegmentTraining):
+    """`python -m jaxplan.train sampler`."""
+
+    name: str = "sampler"
+    network: SamplerConfig = SamplerConfig()
+
+
+@dataclass(frozen=True, kw_only=True)
+class FewStepTraining(SegmentTraining):
+    """`python -m jaxplan.train few_step`."""
+
+    name: str = "few_step"
+    network: FewStepConfig = FewStepConfig()
+    teacher: str = "jaxplan/pretrained"
+    """Directory with the diffusion sampler's weights."""
+    learned_steps: tuple[int, ...] = (96, 72, 48, 24)
+    """Noise steps of the teacher's DDIM run from which its end is learned."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class CvaeTraining(SegmentTraining):
+    """`python -m jaxplan.train cvae`."""
+
+    name: str = "cvae"
+    network: CvaeConfig = CvaeConfig()
+    kl_weight: float = 4e-4
+    """Of the KL divergence (summed over the latent's coordinates) beside the mean squared
+    error of a coordinate; Ichter's number."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class GanTraining(SegmentTraining):
+    """`python -m jaxplan.train gan`."""
+
+    name: str = "gan"
+    network: GanConfig = GanConfig()
+    r1: float = 0.1
+    """Gamma of the penalty gamma / 2 |grad D|^2 on true segments."""
+    instance_noise: float = 0.02
+    """Standard deviation of the noise on what the discriminator sees."""
 
 
 def from_dict(kind: type, values: Any) -> Any:

@@ -1,4 +1,6 @@
-"""`python -m jaxplan.train predictor|sampler --config configs/NAME.py [--overrides]`.
+"""`python -m jaxplan.train KIND --config configs/NAME.py [--overrides]`.
+
+KIND is predictor, sampler (diffusion), cvae, gan or few_step.
 
 Trains one network from demonstrations to exported weights. Started again, it goes on from
 the run's newest checkpoint. `--help` lists every setting.
@@ -20,11 +22,41 @@ import numpy as np
 import tyro
 
 from jaxplan import data, learning
-from jaxplan.config import PredictorTraining, SamplerTraining, TrainConfig
-from jaxplan.learning import predictor, sampler, segments
+from jaxplan.config import (
+    CvaeTraining,
+    FewStepTraining,
+    GanTraining,
+    PredictorTraining,
+    SamplerTraining,
+    SegmentTraining,
+    TrainConfig,
+)
+from jaxplan.learning import (
+    cvae,
+    diffusion,
+    few_step,
+    gan,
+    predictor,
+    sampler,
+    segments,
+)
+from jaxplan.learning.train_state import Loss, Params
+from jaxplan.networks import init
 
-KINDS = {"predictor": PredictorTraining, "sampler": SamplerTraining}
-Training = PredictorTraining | SamplerTraining
+KINDS = {
+    "predictor": PredictorTraining,
+    "sampler": SamplerTraining,
+    "cvae": CvaeTraining,
+    "gan": GanTraining,
+    "few_step": FewStepTraining,
+}
+LOSSES = {
+    "sampler": diffusion.loss,
+    "cvae": cvae.loss,
+    "gan": gan.loss,
+    "few_step": few_step.loss,
+}
+Training = PredictorTraining | SegmentTraining
 RUNS = Path("runs")
 
 logger = logging.getLogger(__name__)
@@ -43,7 +75,8 @@ def main(arguments: list[str] | None = None) -> int:
         if isinstance(config, PredictorTraining):
             path = train_predictor(config)
         else:
-            path = train_sampler(config)
+            kinds = {kind: name for name, kind in KINDS.items()}
+            path = train_sampler(kinds[type(config)], config)
         logger.info("weights: %s", path)
         return 0
     except learning.TrainingDiverged as error:
@@ -70,7 +103,7 @@ def parse(arguments: list[str]) -> Training:
     first.add_argument("--config")
     chosen, rest = first.parse_known_args(arguments)
     if chosen.kind not in KINDS:
-        raise UsageError(f"train what? {' or '.join(KINDS)} (got {chosen.kind!r})")
+        raise UsageError(f"train what? {', '.join(KINDS)} (got {chosen.kind!r})")
     default = KINDS[chosen.kind]()
     if chosen.config is not None:
         default = _read_config(chosen.config, chosen.kind)
@@ -101,8 +134,9 @@ def train_predictor(config: PredictorTraining) -> Path:
     state, metrics = learning.fit(
         config,
         RUNS / config.name,
-        _initial(config, "predictor")
-        or predictor.init(config.network, key, gather(rows[:1])),
+        _initial(
+            config, "predictor", predictor.init(config.network, key, gather(rows[:1]))
+        ),
         partial(predictor.loss, config),
         rows,
         gather,
@@ -111,11 +145,12 @@ def train_predictor(config: PredictorTraining) -> Path:
     return _export(config, "predictor", state.ema_params, hashes, metrics)
 
 
-def train_sampler(config: SamplerTraining) -> Path:
-    """Trains the diffusion sampler and exports it; returns the weights' path."""
+def train_sampler(kind: str, config: SegmentTraining) -> Path:
+    """Trains a learned sampler and exports it; returns the weights' path."""
     upper = None
     if config.network.encoder is None:
         upper = learning.load_weights("predictor", config.predictor)
+    loss = _sampler_loss(kind, config, upper)
     shard, hashes = _read(config)
     image = shard.image
     if upper is not None:
@@ -123,20 +158,39 @@ def train_sampler(config: SamplerTraining) -> Path:
         image = predictor.image_features(upper.config, upper.params, image)
     held = learning.held_out(shard.seed, config.val_fraction)
     rows, val_rows = _split(segments.eligible(shard, config.network.step_min), held)
-    key = jax.random.key(config.seed)
-    gather = partial(sampler.gather, shard, image)
+    fresh = jax.jit(init, static_argnums=(0, 2))(
+        config.network, jax.random.key(config.seed), image.shape[1:]
+    )
     state, metrics = learning.fit(
         config,
         RUNS / config.name,
-        _initial(config, "sampler")
-        or sampler.init(config.network, key, gather(rows[:1])),
-        partial(sampler.loss, config),
+        _initial(config, kind, fresh),
+        loss,
         rows,
-        gather,
-        sampler.validation(config, shard, image, val_rows),
+        partial(sampler.gather, shard, image),
+        sampler.validation(config, loss, shard, image, val_rows),
     )
     extra = {"predictor_sha256": upper.info["sha256"]} if upper else {}
-    return _export(config, "sampler", state.ema_params, hashes, metrics, extra)
+    return _export(config, kind, state.ema_params, hashes, metrics, extra)
+
+
+def _sampler_loss(
+    kind: str, config: SegmentTraining, upper: learning.Weights | None
+) -> Loss:
+    """The kind's loss; the few-step sampler's has its teacher in it.
+
+    Raises:
+        UsageError: The teacher sees other conditions than the pupil.
+    """
+    if not isinstance(config, FewStepTraining):
+        return partial(LOSSES[kind], config)
+    teacher = learning.load_weights("sampler", config.teacher)
+    own = upper and upper.info["sha256"]
+    if teacher.info.get("predictor_sha256") != own:
+        raise UsageError(
+            f"the sampler in {config.teacher} was trained on another predictor's features"
+        )
+    return partial(few_step.loss, config, teacher)
 
 
 def _read(config: TrainConfig) -> tuple[data.Shard, dict[str, str]]:
@@ -159,14 +213,22 @@ def _split(rows: np.ndarray, held: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return train, val
 
 
-def _initial(config: Training, kind: str) -> dict | None:
-    """The weights that `config.init` names, if it does."""
+def _initial(config: Training, kind: str, fresh: Params) -> Params:
+    """The weights that `config.init` names, if it does, in place of the fresh ones."""
     if config.init is None:
-        return None
+        return fresh
     weights = learning.load_weights(kind, config.init)
     if weights.config != config.network:
         raise UsageError(f"{config.init} holds a {kind} with other --network settings")
-    return jax.tree.map(jnp.asarray, weights.params)
+    return _merged(fresh, jax.tree.map(jnp.asarray, weights.params))
+
+
+def _merged(fresh: Params, known: Params) -> Params:
+    """`fresh` with the arrays of `known` in place of its own; training may need more."""
+    if not isinstance(known, dict):
+        return known
+    more = {name: _merged(fresh[name], value) for name, value in known.items()}
+    return {**fresh, **more}
 
 
 def _export(
@@ -180,7 +242,7 @@ def _export(
     directory = RUNS / config.name / "weights" if config.out is None else config.out
     training = dataclasses.asdict(dataclasses.replace(config, out=None))
     training.pop("network")  # `save_weights` records it
-    for paths in ("data", "init", "predictor"):
+    for paths in ("data", "init", "predictor", "teacher"):
         training.pop(paths, None)  # the checksums say it without a machine's paths
     info = {"data": hashes, "metrics": metrics, "training": training, **(extra or {})}
     return learning.save_weights(directory, kind, params, config.network, info)

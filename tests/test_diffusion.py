@@ -48,7 +48,9 @@ def test_ddim_of_a_gaussian_is_its_closed_form(steps):
         return gain * (x_t - jnp.sqrt(a) * mean)
 
     noise = jax.random.normal(jax.random.key(0), (4096, 1))
-    out = np.asarray(diffusion.ddim(denoise, noise, 100, steps))
+    out = np.asarray(
+        diffusion.ddim(denoise, noise, 100, diffusion.timesteps(100, steps))
+    )
     # The same map in float64, as slope and offset.
     slope, offset = 1.0, 0.0
     chosen = np.float64(diffusion.alphas_cumprod(100)[diffusion.timesteps(100, steps)])
@@ -74,14 +76,15 @@ def test_ddim_recovers_a_point_exactly():
         return (x_t - jnp.sqrt(abar[t]) * point) / jnp.sqrt(1 - abar[t])
 
     noise = jax.random.normal(jax.random.key(1), (5, 3))
-    out = diffusion.ddim(denoise, noise, 100, 25)
+    out = diffusion.ddim(denoise, noise, 100, diffusion.timesteps(100, 25))
     np.testing.assert_allclose(out, jnp.broadcast_to(point, (5, 3)), atol=1e-4)
 
 
 def test_clip_bounds_the_sample():
     noise = jax.random.normal(jax.random.key(2), (64, 8))
+    steps = diffusion.timesteps(100, 10)
     out = diffusion.ddim(
-        lambda x, t: -9.0 * x, noise, 100, 10, clip=diffusion.bounds(7)
+        lambda x, t: -9.0 * x, noise, 100, steps, clip=diffusion.bounds(7)
     )
     assert np.all(np.abs(out) <= diffusion.bounds(7) + 1e-5)
 

@@ -17,9 +17,7 @@ from jaxplan.config import (
     AugmentConfig,
     LossConfig,
     OptimizerConfig,
-    PredictorConfig,
     PredictorTraining,
-    SamplerTraining,
     from_dict,
 )
 from jaxplan.learning import (
@@ -32,7 +30,7 @@ from jaxplan.learning import (
     segments,
 )
 from jaxplan.learning.train_state import ema_decay, init_state, optimizer
-from jaxplan.networks import Prediction
+from jaxplan.networks import Prediction, init
 
 CONFIGS = Path(__file__).parents[1] / "configs"
 
@@ -303,14 +301,12 @@ def test_half_a_checkpoint_does_not_count(tmp_path):
 
 
 def test_weights_round_trip_and_damage(tmp_path):
-    params = {"params": {"a": {"kernel": np.arange(6.0).reshape(2, 3)}}}
-    config = PredictorConfig(hidden=7)
+    config = runpy.run_path(str(CONFIGS / "debug.py"))["predictor"].network
+    params = init(config, jax.random.key(0), data.IMAGE_SHAPE)
     path = learning.save_weights(tmp_path, "predictor", params, config, {"metrics": {}})
     weights = learning.load_weights("predictor", tmp_path)
     assert weights.config == config
-    np.testing.assert_array_equal(
-        weights.params["params"]["a"]["kernel"], params["params"]["a"]["kernel"]
-    )
+    jax.tree.map(np.testing.assert_array_equal, weights.params, params)
     with pytest.raises(learning.WeightsError, match="no sampler in"):
         learning.load_weights("sampler", tmp_path)
     content = bytearray(path.read_bytes())
@@ -327,7 +323,7 @@ def test_weights_round_trip_and_damage(tmp_path):
 
 
 def test_configs_survive_json():
-    for kind in (PredictorTraining, SamplerTraining):
+    for kind in train.KINDS.values():
         config = kind()
         values = json.loads(json.dumps(dataclasses.asdict(config)))
         assert from_dict(kind, values) == config
@@ -366,7 +362,7 @@ def test_the_door_trains_both_networks(demos, tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["planner"], "predictor or sampler"),
+        (["planner"], "predictor, sampler, cvae"),
         (["predictor", "--stepz", "3"], "did you mean --steps"),
         (["predictor", "--network.hiden", "3"], "did you mean --network.hidden"),
         (
@@ -375,7 +371,7 @@ def test_the_door_trains_both_networks(demos, tmp_path, monkeypatch):
         ),
         (["predictor", "--data", "/none"], "no such data directory: /none"),
         (
-            ["sampler", "--config", str(CONFIGS / "sampler.py"), "--predictor", "/no"],
+            ["sampler", "--config", str(CONFIGS / "compact.py"), "--predictor", "/no"],
             "missing weights",
         ),
     ],

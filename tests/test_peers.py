@@ -112,20 +112,14 @@ def test_pybullet_agrees_with_mujoco(robot, problems):
         assert same.mean() > 0.99  # single precision, and margins on its boxes
 
 
-def test_torch_has_our_network():
-    """Torch's weights in our network give torch's eps."""
-    torch = pytest.importorskip("torch")
-    import jax
+def torch_weights(sampler):
+    """The denoiser's weights under short names, and a layer of ours from one of torch's."""
     import jax.numpy as jnp
-    from torch_peer import TorchSampler
 
-    from jaxplan.config import SamplerConfig
-    from jaxplan.networks.sampler import SamplerNetwork
-
-    config = SamplerConfig(hidden=(16, 24, 32), encoder=None)
-    torch.manual_seed(0)
-    theirs = TorchSampler(config)
-    weights = {k: jnp.asarray(v.numpy()) for k, v in theirs.state_dict().items()}
+    weights = {
+        k.removeprefix("denoiser."): jnp.asarray(v.numpy())
+        for k, v in sampler.state_dict().items()
+    }
 
     def dense(name):
         kernel = weights[f"{name}.weight"]
@@ -134,6 +128,71 @@ def test_torch_has_our_network():
         else:
             kernel = kernel.T
         return {"kernel": kernel, "bias": weights[f"{name}.bias"]}
+
+    return weights, dense
+
+
+def check_same_eps(theirs, params):
+    """Ours with torch's weights says what torch says."""
+    import torch
+
+    from jaxplan.networks import SamplerNetwork
+
+    config, rng = theirs.config, np.random.default_rng(0)
+    x_t, cond = rng.normal(size=(4, 8)), rng.normal(size=(4, config.cond_features))
+    x_t, cond, t = x_t.astype("f"), cond.astype("f"), np.array([0, 4, 48, 96])
+    network, params = SamplerNetwork(config), {"params": params}
+    film = network.apply(params, cond, t, method="film")
+    ours = network.apply(params, x_t, film, method="denoise")
+    with torch.inference_mode():
+        eps = theirs(*map(torch.tensor, (x_t, t.astype("f"), cond))).numpy()
+    np.testing.assert_allclose(ours, eps, atol=2e-5)
+    assert theirs.draw(torch.tensor(cond)).shape == (4, 8)
+
+
+def test_torch_has_our_film_mlp():
+    torch = pytest.importorskip("torch")
+    import jax
+    import jax.numpy as jnp
+    from torch_peer import TorchSampler
+
+    from jaxplan.config import SamplerConfig
+
+    config = SamplerConfig(denoiser="film_mlp", hidden=(16, 16), encoder=None)
+    torch.manual_seed(0)
+    theirs = TorchSampler(config)
+    weights, dense = torch_weights(theirs)
+
+    def norm(name):
+        return {"scale": weights[f"{name}.weight"], "bias": weights[f"{name}.bias"]}
+
+    layers = [f"{part}.{i}" for i in range(2) for part in ("first", "second")]
+    layers = ["begin", *layers, "end.2"]
+    norms = ["norm.0", "norm.1", "end.0"]
+    films = [dense(f"film.{i}") for i in range(2)]
+    params = {
+        "step": {"layers_0": dense("step.0"), "layers_2": dense("step.2")},
+        "modulation": jax.tree.map(lambda *x: jnp.concatenate(x, -1), *films),
+        "denoiser": {
+            **{f"Dense_{i}": dense(name) for i, name in enumerate(layers)},
+            **{f"LayerNorm_{i}": norm(name) for i, name in enumerate(norms)},
+        },
+    }
+    check_same_eps(theirs, params)
+
+
+def test_torch_has_our_unet():
+    torch = pytest.importorskip("torch")
+    import jax
+    import jax.numpy as jnp
+    from torch_peer import TorchSampler
+
+    from jaxplan.config import SamplerConfig
+
+    config = SamplerConfig(hidden=(16, 24, 32), encoder=None)
+    torch.manual_seed(0)
+    theirs = TorchSampler(config)
+    weights, dense = torch_weights(theirs)
 
     def conv_block(name):
         norm = {"scale": weights[f"{name}.1.weight"], "bias": weights[f"{name}.1.bias"]}
@@ -168,13 +227,4 @@ def test_torch_has_our_network():
             "Dense_0": dense("end.1"),
         },
     }
-    rng = np.random.default_rng(0)
-    x_t, cond = rng.normal(size=(4, 8)), rng.normal(size=(4, config.cond_features))
-    x_t, cond, t = x_t.astype("f"), cond.astype("f"), np.array([0, 4, 48, 96])
-    network, params = SamplerNetwork(config), {"params": params}
-    film = network.apply(params, cond, t, method="film")
-    ours = network.apply(params, x_t, film, method="denoise")
-    with torch.inference_mode():
-        eps = theirs(*map(torch.tensor, (x_t, t.astype("f"), cond))).numpy()
-    np.testing.assert_allclose(ours, eps, atol=2e-5)
-    assert theirs.draw(torch.tensor(cond)).shape == (4, 8)
+    check_same_eps(theirs, params)

@@ -1,15 +1,24 @@
-"""Drawing segments: units, and independence from the rest of the batch."""
+"""Drawing segments: units, independence from the rest of the batch, closed forms."""
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxplan.config import SamplerConfig
-from jaxplan.networks import Cond, SamplerNetwork
-from jaxplan.samplers import diffusion
+from jaxplan import samplers
+from jaxplan.config import CvaeConfig, FewStepConfig, GanConfig, SamplerConfig
+from jaxplan.networks import Cond, init
+from jaxplan.samplers import few_step
+from jaxplan.samplers.diffusion import noise
 
-draw = jax.jit(diffusion.draw, static_argnums=(0, 4))
+draw = jax.jit(samplers.draw, static_argnums=(0, 4))
+CONFIGS = [
+    SamplerConfig(denoiser="unet1d", hidden=(16, 32), encoder=None),
+    SamplerConfig(denoiser="film_mlp", hidden=(16, 32), encoder=None),
+    FewStepConfig(denoiser="film_mlp", hidden=(16,), encoder=None),
+    CvaeConfig(hidden=(16, 16), encoder=None, relative=True),
+    GanConfig(generator=(16, 16), discriminator=(8,), encoder=None),
+]
 
 
 def condition(batch: int) -> Cond:
@@ -20,26 +29,26 @@ def condition(batch: int) -> Cond:
     return Cond(image, q, mode, q_toggle, 1 - mode, q_goal)
 
 
-def weights(config: SamplerConfig) -> dict:
-    params = jax.jit(SamplerNetwork(config).init)(
-        jax.random.key(0), jnp.zeros((2, 8)), jnp.zeros(2, jnp.int32), condition(2)
+def weights(config, training: bool = False) -> dict:
+    params = jax.jit(init, static_argnums=(0, 2, 3))(
+        config, jax.random.key(0), (12,), training
     )
     return jax.tree.map(lambda p: p + 0.01, params)
 
 
-@pytest.mark.parametrize("denoiser", ["unet1d", "film_mlp"])
-def test_segments_are_segments(denoiser):
-    config = SamplerConfig(denoiser=denoiser, hidden=(16, 32), encoder=None)
+@pytest.mark.parametrize("config", CONFIGS, ids=lambda c: type(c).__name__)
+def test_segments_are_segments(config):
     keys = jax.random.split(jax.random.key(2), 3)
     segment = draw(config, weights(config), condition(3), keys, 5)
     assert segment.direction.shape == (3, 5, 7)
     np.testing.assert_allclose(np.linalg.norm(segment.direction, axis=-1), 1, atol=1e-5)
     assert np.all(segment.length >= 0.05 - 1e-6)
     assert np.all(segment.length <= 0.2 + 1e-6)
+    assert np.ptp(segment.direction, axis=1).max() > 1e-3, "one and the same segment"
 
 
-def test_a_problem_does_not_see_its_neighbours():
-    config = SamplerConfig(denoiser="film_mlp", hidden=(16,), encoder=None)
+@pytest.mark.parametrize("config", CONFIGS[1:], ids=lambda c: type(c).__name__)
+def test_a_problem_does_not_see_its_neighbours(config):
     params, cond = weights(config), condition(4)
     keys = jax.random.split(jax.random.key(2), 4)
     whole = draw(config, params, cond, keys, 3)
@@ -47,3 +56,36 @@ def test_a_problem_does_not_see_its_neighbours():
     part = draw(config, params, jax.tree.map(lambda x: x[rows], cond), keys[rows], 3)
     np.testing.assert_allclose(part.direction, whole.direction[rows], atol=1e-4)
     np.testing.assert_allclose(part.length, whole.length[rows], atol=1e-4)
+
+
+@pytest.mark.parametrize("config", CONFIGS[3:], ids=lambda c: type(c).__name__)
+def test_drawing_needs_no_weights_of_training(config):
+    keys = jax.random.split(jax.random.key(2), 3)
+    whole, part = weights(config, training=True)["params"], weights(config)["params"]
+    assert set(part) < set(whole)
+    kept = {"params": {name: whole[name] for name in part}}
+    one = draw(config, {"params": whole}, condition(3), keys, 2)
+    other = draw(config, kept, condition(3), keys, 2)
+    np.testing.assert_array_equal(one.direction, other.direction)
+
+
+@pytest.mark.parametrize("count", [1, 4])
+def test_without_velocity_a_few_steps_only_scale_the_noise(count):
+    """v = 0, as of fresh weights, makes every step a multiple of x_t."""
+    config = FewStepConfig(
+        denoiser="film_mlp", hidden=(16,), encoder=None, num_inference_steps=count
+    )
+    params = init(config, jax.random.key(0), (12,))
+    keys = jax.random.split(jax.random.key(2), 3)
+    x_T = noise(keys, 5, 8)[..., :7]
+    segment = draw(config, params, condition(3), keys, 5)
+    expected = x_T / jnp.linalg.norm(x_T, axis=-1, keepdims=True)
+    np.testing.assert_allclose(segment.direction, expected, atol=2e-5)
+
+
+def test_few_steps_part_the_teachers_way():
+    for count, steps in ((1, [96]), (2, [96, 48]), (4, [96, 72, 48, 24])):
+        config = FewStepConfig(num_inference_steps=count)
+        assert few_step.timesteps(config).tolist() == steps
+    with pytest.raises(ValueError, match="num_inference_steps is 0"):
+        few_step.timesteps(FewStepConfig(num_inference_steps=0))

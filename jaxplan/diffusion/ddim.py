@@ -27,7 +27,7 @@ def ddim(
     denoise: Denoise,
     x_T: jax.Array,
     num_train_timesteps: int,
-    num_inference_steps: int,
+    steps: np.ndarray,
     clip: float | jax.Array = jnp.inf,
 ) -> jax.Array:
     """Carries noise x_T to a sample x_0 of the same shape.
@@ -36,19 +36,30 @@ def ddim(
         denoise: (x_t, t) -> eps, with t an i32 scalar.
         x_T: Standard normal noise [..., D].
         num_train_timesteps: T of the schedule.
-        num_inference_steps: Calls of `denoise`.
+        steps: Noise steps visited, falling, as from `timesteps`.
         clip: Bound on |x_0|, broadcastable to [..., D].
     """
-    steps = timesteps(num_train_timesteps, num_inference_steps)
+    return ddim_path(denoise, x_T, num_train_timesteps, steps, clip)[1]
+
+
+def ddim_path(
+    denoise: Denoise,
+    x_T: jax.Array,
+    num_train_timesteps: int,
+    steps: np.ndarray,
+    clip: float | jax.Array = jnp.inf,
+) -> tuple[jax.Array, jax.Array]:
+    """The x_t of all steps [len(steps), ..., D], and x_0 [..., D]; arguments of `ddim`."""
     abar = alphas_cumprod(num_train_timesteps)[steps]
     abar_next = np.append(abar[1:], np.float32(1.0))
 
-    def step(x_t: jax.Array, at: tuple) -> tuple[jax.Array, None]:
+    def step(x_t: jax.Array, at: tuple) -> tuple[jax.Array, jax.Array]:
         t, abar, abar_next = at
         eps = denoise(x_t, t)
         x_0 = (x_t - jnp.sqrt(1.0 - abar) * eps) / jnp.sqrt(abar)
         x_0 = jnp.clip(x_0, -clip, clip)
-        return jnp.sqrt(abar_next) * x_0 + jnp.sqrt(1.0 - abar_next) * eps, None
+        return jnp.sqrt(abar_next) * x_0 + jnp.sqrt(1.0 - abar_next) * eps, x_t
 
     rows = (jnp.asarray(steps), jnp.asarray(abar), jnp.asarray(abar_next))
-    return jax.lax.scan(step, x_T, rows)[0]
+    x_0, path = jax.lax.scan(step, x_T, rows)
+    return path, x_0

@@ -8,6 +8,7 @@ import dataclasses
 import json
 import os
 import subprocess
+from collections.abc import Iterator
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -15,12 +16,26 @@ from typing import Any, NamedTuple
 import jax
 import numpy as np
 
-from jaxplan.config import PredictorConfig, SamplerConfig, from_dict
-from jaxplan.data import sha256, write_atomic, write_npz
+from jaxplan.config import (
+    CvaeConfig,
+    FewStepConfig,
+    GanConfig,
+    PredictorConfig,
+    SamplerConfig,
+    from_dict,
+)
+from jaxplan.data import IMAGE_SHAPE, sha256, write_atomic, write_npz
+from jaxplan.networks import init
 
 DIRECTORY = Path(__file__).parents[1] / "pretrained"
 """The weights that the package ships."""
-KINDS = {"predictor": PredictorConfig, "sampler": SamplerConfig}
+KINDS = {
+    "predictor": PredictorConfig,
+    "sampler": SamplerConfig,
+    "cvae": CvaeConfig,
+    "gan": GanConfig,
+    "few_step": FewStepConfig,
+}
 MANIFEST = "manifest.json"
 
 
@@ -32,7 +47,7 @@ class Weights(NamedTuple):
     """A network ready to use."""
 
     config: Any
-    """`PredictorConfig` or `SamplerConfig`."""
+    """Of the class that `KINDS` has for the name."""
     params: dict
     info: dict
     """The manifest's entry."""
@@ -45,13 +60,14 @@ def save_weights(
 
     Args:
         directory: Where; made if it does not exist.
-        name: "predictor" or "sampler".
-        params: Nested dict of arrays.
+        name: One of `KINDS`.
+        params: Nested dict of arrays. What only training needs is left out.
         config: The network's config.
         info: What else the manifest should say; must be JSON.
     """
     path = Path(directory) / f"{name}.npz"
-    write_npz(path, _flatten(jax.device_get(params)))
+    flat = _flatten(jax.device_get(params))
+    write_npz(path, {key: flat[key] for key in _shapes(config, flat)})
     manifest = _read_manifest(directory) if (path.parent / MANIFEST).exists() else {}
     manifest[name] = {
         "file": path.name,
@@ -91,24 +107,55 @@ def load_weights(name: str, directory: str | os.PathLike = DIRECTORY) -> Weights
             f"damaged weights: {path} (checksum differs from {MANIFEST})"
         )
     with np.load(path, allow_pickle=False) as archive:
-        params = _unflatten({key: archive[key] for key in archive.files})
-    return Weights(config, params, info)
+        flat = {key: archive[key] for key in archive.files}
+    _check_shapes(path, flat, _shapes(config, flat))
+    return Weights(config, _unflatten(flat), info)
 
 
-def load_pair(directory: str | os.PathLike = DIRECTORY) -> tuple[Weights, Weights]:
-    """The predictor, and the sampler that was trained on its features.
+def load_pair(
+    directory: str | os.PathLike = DIRECTORY, name: str = "sampler"
+) -> tuple[Weights, Weights]:
+    """The predictor, and a sampler that was trained on its features.
+
+    Args:
+        directory: Where the weights and their manifest are.
+        name: Of the sampler.
 
     Raises:
         WeightsError: As `load_weights`, or the sampler belongs to another predictor.
     """
     predictor = load_weights("predictor", directory)
-    sampler = load_weights("sampler", directory)
+    sampler = load_weights(name, directory)
     wanted = sampler.info.get("predictor_sha256")
     if wanted not in (None, predictor.info["sha256"]):
         raise WeightsError(
-            f"the sampler in {directory} was trained on another predictor's features"
+            f"the {name} in {directory} was trained on another predictor's features"
         )
     return predictor, sampler
+
+
+def _shapes(config: Any, flat: dict[str, np.ndarray]) -> dict[str, tuple[int, ...]]:
+    """What weights of this config consist of, to draw or predict with."""
+    norms = [key for key in flat if key.endswith("condition/image_norm/scale")]
+    own = not norms or config.encoder is not None
+    image = IMAGE_SHAPE if own else flat[norms[0]].shape
+    params = jax.eval_shape(
+        lambda key: init(config, key, image, False), jax.random.key(0)
+    )
+    return {key: value.shape for key, value in _leaves(params)}
+
+
+def _check_shapes(
+    path: Path, flat: dict[str, np.ndarray], wanted: dict[str, tuple[int, ...]]
+) -> None:
+    """Refuses weights that are not those of the config beside them."""
+    for key in sorted(flat | wanted):
+        found = flat[key].shape if key in flat else "missing"
+        if found != wanted.get(key, "unknown"):
+            raise WeightsError(
+                f"weights of another network: {path} ({key} is {found}, "
+                f"its config expects {wanted.get(key, 'none')})"
+            )
 
 
 def _read_manifest(directory: str | os.PathLike) -> dict:
@@ -124,14 +171,17 @@ def _read_manifest(directory: str | os.PathLike) -> dict:
     return manifest
 
 
-def _flatten(params: dict, prefix: str = "") -> dict[str, np.ndarray]:
-    flat = {}
+def _flatten(params: dict) -> dict[str, np.ndarray]:
+    return {key: np.asarray(value) for key, value in _leaves(params)}
+
+
+def _leaves(params: dict, prefix: str = "") -> Iterator[tuple[str, Any]]:
+    """Names with slashes, sorted, and what they stand for."""
     for key, value in sorted(params.items()):
         if isinstance(value, dict):
-            flat |= _flatten(value, f"{prefix}{key}/")
+            yield from _leaves(value, f"{prefix}{key}/")
         else:
-            flat[f"{prefix}{key}"] = np.asarray(value)
-    return flat
+            yield f"{prefix}{key}", value
 
 
 def _unflatten(flat: dict[str, np.ndarray]) -> dict:

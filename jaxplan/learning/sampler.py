@@ -1,19 +1,19 @@
-"""Training the diffusion sampler: conditions, loss, and the angle to true directions."""
+"""What the trainings of all learned samplers share: batches, and how drawn segments are judged."""
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 
 from jaxplan import diffusion, samplers
-from jaxplan.config import SamplerConfig, SamplerTraining
+from jaxplan.config import SegmentTraining
 from jaxplan.data import Shard
 from jaxplan.learning.loop import Metrics
 from jaxplan.learning.segments import PathRows, path_rows, training_segments
-from jaxplan.learning.train_state import Params
-from jaxplan.networks import Cond, SamplerNetwork
+from jaxplan.learning.train_state import Loss, Params
+from jaxplan.networks import Cond
 
 
 class Phases(NamedTuple):
@@ -31,30 +31,17 @@ def gather(shard: Shard, image: np.ndarray, rows: np.ndarray) -> Phases:
     return Phases(cond, path_rows(shard, rows))
 
 
-def init(config: SamplerConfig, key: jax.Array, batch: Phases) -> Params:
-    """Fresh weights for conditions of this shape."""
-    cond = jax.tree.map(lambda x: x[:1], batch.cond)
-    x_t, t = jnp.zeros((1, len(config.q_min) + 1)), jnp.zeros(1, jnp.int32)
-    return jax.jit(SamplerNetwork(config).init)(key, x_t, t, cond)
-
-
-def loss(
-    config: SamplerTraining, params: Params, key: jax.Array, batch: Phases
-) -> tuple[jax.Array, dict[str, jax.Array]]:
-    """Equation 5 on fresh segments, with noise on the condition's targets."""
-    key_targets, key_segments, key_eps = jax.random.split(key, 3)
+def examples(
+    config: SegmentTraining, key: jax.Array, batch: Phases
+) -> tuple[Cond, jax.Array]:
+    """Conditions with noise on their targets, and a fresh true x_0 [B, 8] for each."""
+    key_targets, key_segments = jax.random.split(key)
     network = config.network
     cond = perturb_targets(key_targets, batch.cond, config.target_noise)
     _, segment = training_segments(
         key_segments, batch.paths, network.step_min, network.step_max
     )
-    x_0 = diffusion.encode(*segment, network.step_min, network.step_max)
-    model: Any = SamplerNetwork(network)
-
-    def denoise(x_t: jax.Array, t: jax.Array) -> jax.Array:
-        return model.apply(params, x_t, t, cond)
-
-    return diffusion.eps_loss(key_eps, denoise, x_0, network.num_train_timesteps), {}
+    return cond, diffusion.encode(*segment, network.step_min, network.step_max)
 
 
 def perturb_targets(key: jax.Array, cond: Cond, scale: float) -> Cond:
@@ -73,7 +60,11 @@ def perturb_targets(key: jax.Array, cond: Cond, scale: float) -> Cond:
 
 
 def validation(
-    config: SamplerTraining, shard: Shard, image: np.ndarray, rows: np.ndarray
+    config: SegmentTraining,
+    loss: Loss,
+    shard: Shard,
+    image: np.ndarray,
+    rows: np.ndarray,
 ) -> Callable[[Params], Metrics]:
     """Loss on held-out frames, and how well drawn directions match true ones [deg].
 
@@ -89,7 +80,7 @@ def validation(
     @jax.jit
     def run(params: Params, batch: Phases, many: Phases) -> dict[str, jax.Array]:
         keys = jax.random.split(key, len(batch.paths.arc))
-        drawn = samplers.diffusion.draw(network, params, batch.cond, keys, n)
+        drawn = samplers.draw(network, params, batch.cond, keys, n)
         true = jax.vmap(
             lambda k: training_segments(
                 k, batch.paths, network.step_min, network.step_max
@@ -98,8 +89,10 @@ def validation(
         cosine = jnp.einsum("pnj,mpj->pnm", drawn.direction, true.direction)
         angle = jnp.degrees(jnp.arccos(jnp.clip(cosine, -1.0, 1.0)))
         precision, coverage = angle.min(2), angle.min(1)
+        value, parts = loss(params, key, many)
         return {
-            "loss": loss(config, params, key, many)[0],
+            "loss": value,
+            **parts,
             "precision_median": jnp.median(precision),
             "precision_p90": jnp.quantile(precision, 0.9),
             "coverage_median": jnp.median(coverage),

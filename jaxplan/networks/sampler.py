@@ -4,36 +4,15 @@ The FiLM vectors depend on the condition and the noise step only. `film` makes t
 for a phase, `denoise` uses them for all of its samples, and `__call__` is both in one.
 """
 
-from typing import NamedTuple
-
 import flax.linen as nn
 import jax
 import jax.numpy as jnp
 
 from jaxplan.config import SamplerConfig
+from jaxplan.networks.condition import Cond, Condition, mlp
 from jaxplan.networks.film_mlp import FilmMlp
-from jaxplan.networks.joints import normalize
 from jaxplan.networks.mish import mish
-from jaxplan.networks.predictor import state_vector
-from jaxplan.networks.resnet import Encoder
 from jaxplan.networks.unet1d import ConditionalUnet1D
-
-
-class Cond(NamedTuple):
-    """cond = (I, q_curr, q_goal, q_toggle, g_toggle), at the phase's start."""
-
-    image: jax.Array
-    """u8 [..., 88, 136, 3]; with `encoder=None` the predictor's features [..., F]."""
-    q: jax.Array
-    """[..., 7] [rad]."""
-    gripper: jax.Array
-    """[...], 0 open, 1 closed."""
-    q_toggle: jax.Array
-    """[..., 7] [rad]."""
-    gripper_toggle: jax.Array
-    """[...], 0 open, 1 closed."""
-    q_goal: jax.Array
-    """[..., 7] [rad]."""
 
 
 class SamplerNetwork(nn.Module):
@@ -44,12 +23,8 @@ class SamplerNetwork(nn.Module):
     def setup(self) -> None:
         config = self.config
         outputs = len(config.q_min) + 1
-        self.encoder = config.encoder and Encoder(config.encoder)
-        self.image_norm = nn.LayerNorm()
-        self.state = _mlp(64, 64)
-        self.targets = _mlp(128, 128)
-        self.project = nn.Dense(config.cond_features)
-        self.step = _mlp(4 * config.step_features, config.step_features)
+        self.condition = Condition(config)
+        self.step = mlp(4 * config.step_features, config.step_features)
         if config.denoiser == "unet1d":
             self.denoiser = ConditionalUnet1D(config.hidden)
         else:
@@ -57,22 +32,8 @@ class SamplerNetwork(nn.Module):
         self.modulation = nn.Dense(sum(self.denoiser.film_sizes))
 
     def cond(self, cond: Cond) -> jax.Array:
-        """The 256-vector of a condition, [..., cond_features]."""
-        config = self.config
-        image = cond.image if self.encoder is None else self.encoder(cond.image)
-        limits = config.q_min, config.q_max
-        targets = [
-            state_vector(cond.q_toggle, cond.gripper_toggle, *limits),
-            normalize(cond.q_goal, *limits),
-        ]
-        if config.relative:
-            targets += [cond.q_toggle - cond.q, cond.q_goal - cond.q]
-        parts = [
-            self.image_norm(image),
-            self.state(state_vector(cond.q, cond.gripper, *limits)),
-            self.targets(jnp.concatenate(targets, axis=-1)),
-        ]
-        return self.project(jnp.concatenate(parts, axis=-1))
+        """The vector of a condition, [..., cond_features]."""
+        return self.condition(cond)
 
     def film(self, cond: jax.Array, t: jax.Array) -> jax.Array:
         """FiLM vectors of all blocks, for cond [..., C] and noise steps t [...]."""
@@ -98,7 +59,3 @@ def sinusoidal(t: jax.Array, features: int) -> jax.Array:
     rates = jnp.exp(-jnp.log(10000.0) * jnp.arange(half) / (half - 1))
     angles = jnp.asarray(t, jnp.float32)[..., None] * rates
     return jnp.concatenate([jnp.sin(angles), jnp.cos(angles)], axis=-1)
-
-
-def _mlp(hidden: int, outputs: int) -> nn.Sequential:
-    return nn.Sequential([nn.Dense(hidden), mish, nn.Dense(outputs)])

@@ -1,3 +1,3 @@
-"""Learned proposals: each `draw` gives segments for a batch of planning problems."""
+"""Learned proposals: `draw` gives segments for a batch of planning problems."""
 
-from jaxplan.samplers import diffusion as diffusion
+from jaxplan.samplers.draw import draw as draw

@@ -4,49 +4,55 @@ from typing import Any
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 
 from jaxplan import diffusion
-from jaxplan.config import SamplerConfig
-from jaxplan.networks.sampler import Cond, SamplerNetwork
+from jaxplan.config import SamplerConfig, SegmentConfig
+from jaxplan.networks import Cond, SamplerNetwork
 from jaxplan.planning.segment import Segment
 
 
 def draw(
     config: SamplerConfig, params: dict, cond: Cond, keys: jax.Array, n: int
 ) -> Segment:
-    """`n` segments for each of P problems, in one batched DDIM run.
+    """`n` segments for each of P problems by DDIM; see `samplers.draw`."""
+    steps = diffusion.timesteps(config.num_train_timesteps, config.num_inference_steps)
+    x_0 = diffusion.ddim(
+        denoiser(config, params, cond, steps),
+        noise(keys, n, len(config.q_min) + 1),
+        config.num_train_timesteps,
+        steps,
+        clip=diffusion.bounds(len(config.q_min)),
+    )
+    return segments(config, x_0)
 
-    The FiLM vectors of all noise steps are made first, once per problem: of the loop, only
-    the denoiser itself is left. Un-jitted; the caller jits it with `config` and `n` static.
 
-    Args:
-        config: The network that `params` belongs to, and the number of DDIM steps.
-        params: Weights.
-        cond: Conditions with leading axis P.
-        keys: Typed keys [P]. Problem p's segments depend on its own key and condition only.
-        n: Segments per problem.
+def denoiser(
+    config: SamplerConfig, params: dict, cond: Cond, steps: np.ndarray
+) -> diffusion.Denoise:
+    """(x_t [P, n, 8], t) -> the network's output, for t among `steps`.
 
-    Returns:
-        Segment with direction [P, n, 7] and length [P, n] [rad].
+    The FiLM vectors of all noise steps are made here, once per problem: of the loop, only
+    the denoiser itself is left.
     """
     network: Any = SamplerNetwork(config)
-    steps = diffusion.timesteps(config.num_train_timesteps, config.num_inference_steps)
-    stride = config.num_train_timesteps // config.num_inference_steps
     vector = network.apply(params, cond, method="cond")
-    # Row k of the table belongs to t = k * stride ("leading" spacing).
-    table = network.apply(params, vector, jnp.sort(steps)[:, None], method="film")
+    table = network.apply(params, vector, jnp.asarray(steps)[:, None], method="film")
+    row = np.zeros(config.num_train_timesteps, np.int32)
+    row[steps] = np.arange(len(steps))
 
     def denoise(x_t: jax.Array, t: jax.Array) -> jax.Array:
-        film = table[t // stride][:, None, :]
+        film = table[jnp.asarray(row)[t]][:, None, :]
         return network.apply(params, x_t, film, method="denoise")
 
-    joints = len(config.q_min)
-    noise = jax.vmap(lambda key: jax.random.normal(key, (n, joints + 1)))(keys)
-    x_0 = diffusion.ddim(
-        denoise,
-        noise,
-        config.num_train_timesteps,
-        config.num_inference_steps,
-        clip=diffusion.bounds(joints),
-    )
+    return denoise
+
+
+def noise(keys: jax.Array, n: int, size: int) -> jax.Array:
+    """Standard normal numbers [P, n, size] of the problems with keys [P]."""
+    return jax.vmap(lambda key: jax.random.normal(key, (n, size)))(keys)
+
+
+def segments(config: SegmentConfig, x_0: jax.Array) -> Segment:
+    """x_0 [..., 8] as a Segment."""
     return Segment(*diffusion.decode(x_0, config.step_min, config.step_max))

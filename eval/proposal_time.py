@@ -1,0 +1,218 @@
+"""Table 3: time per learned proposal, planner excluded.
+
+    python eval/proposal_time.py
+
+Three settings, 500 proposals of each sampler, sides taking turns:
+
+    one at a time        the shipped networks at batch 1, as in the paper; the diffusion
+                         network in PyTorch beside them
+    a phase's bank       the same networks, a bank of segments for each of a batch's episodes
+                         in one call: what a search pays for a proposal
+    the paper's network  U-Net (64, 128, 256) with random weights, one at a time
+
+The image's features are given: an image is encoded once a phase, whoever samples, and how
+long that takes is printed too.
+"""
+
+import json
+from dataclasses import asdict, dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+from peers import absent, peer_versions
+from proposal_speed import torch_sides
+from rows import Row
+from turns import Side, compiled, take_turns
+
+from jaxplan.agent import BANK
+from jaxplan.cli import run_script
+from jaxplan.config import SamplerConfig
+from jaxplan.data import IMAGE_SHAPE
+from jaxplan.learning import Weights, WeightsError, load_weights
+from jaxplan.learning.pretrained import DIRECTORY
+from jaxplan.networks import Cond, init, predict
+from jaxplan.provenance import versions
+from jaxplan.samplers import draw
+
+PART = "Table 3"
+ONE, PHASE, PAPER = "one at a time", "a phase's bank", "the paper's network"
+DDIM = "DDIM 25"
+PUBLISHED = {DDIM: 1.0, "DDIM 10": 0.42, "CVAE": 0.09, "GAN": 0.11}
+"""Times per proposal of the paper's Table 3, DDIM 25 = 1."""
+EPISODES = 32
+"""Episodes of a batch whose phases are drawn for together."""
+
+
+@dataclass(frozen=True)
+class Args:
+    """Measures how long each sampler takes for a proposal."""
+
+    proposals: int = 500
+    """Of each sampler, one at a time; a tenth as many calls for a phase's bank."""
+    quick: bool = False
+    """50 proposals."""
+    weights: Path = DIRECTORY
+    out: Path = Path("eval/results/proposal_time.json")
+
+
+def main(args: Args) -> None:
+    """Measures, prints the table, writes JSON."""
+    count = min(args.proposals, 50) if args.quick else args.proposals
+    samplers, notes = shipped(args.weights)
+    upper = load_weights("predictor", args.weights)
+    features = upper.config.encoder.features
+    large = SamplerConfig(encoder=None)
+    network = Weights(
+        large, jax.jit(partial(init, large, image=(features,)))(jax.random.key(0)), {}
+    )
+    unet = {
+        DDIM: network,
+        "DDIM 10": network._replace(config=replace(large, num_inference_steps=10)),
+    }
+    ones = [side(name, w, features, 1, 1) for name, w in samplers.items()]
+    many = [side(name, w, features, EPISODES, BANK) for name, w in samplers.items()]
+    big = [side(name, w, features, 1, 1) for name, w in unet.items()]
+    if DDIM in samplers:
+        ones += torch_peer(samplers[DDIM].config)
+    big += torch_peer(large)
+    measured = {
+        ONE: times(ONE, [*ones, encoding(upper)], count),
+        PHASE: times(PHASE, many, max(5, count // 10)),
+        PAPER: times(PAPER, big, count),
+    }
+    result = {
+        "settings": measured,
+        "checks": checks(measured),
+        "published": PUBLISHED,
+        "notes": notes,
+        "proposals": count,
+        "bank": [EPISODES, BANK],
+        "quick": args.quick,
+        "weights": {name: w.info.get("sha256") for name, w in samplers.items()},
+        "configs": {name: asdict(w.config) for name, w in samplers.items()},
+        "versions": versions() | peer_versions(),
+    }
+    show(result)
+    args.out.parent.mkdir(parents=True, exist_ok=True)
+    args.out.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
+    print(f"written to {args.out}")
+
+
+def shipped(directory: Path) -> tuple[dict[str, Weights], dict[str, str]]:
+    """The samplers that are there by their name in the table, and why others are not."""
+    samplers, notes = {}, {}
+    names = {"sampler": DDIM, "cvae": "CVAE", "gan": "GAN", "few_step": "few-step"}
+    for name, title in names.items():
+        try:
+            weights = load_weights(name, directory)
+        except WeightsError as error:
+            notes[title] = str(error)
+            continue
+        if name == "sampler":
+            for steps in (25, 10):
+                config = replace(weights.config, num_inference_steps=steps)
+                samplers[f"DDIM {steps}"] = weights._replace(config=config)
+        else:
+            samplers[title] = weights
+    return samplers, notes
+
+
+def side(
+    name: str, weights: Weights, features: int, problems: int, segments: int
+) -> Side:
+    """One call of a sampler, condition network included, for conditions of zeros."""
+    config = weights.config
+    joints = jnp.zeros((problems, len(config.q_min)))
+    mode = jnp.zeros(problems, jnp.int32)
+    cond = Cond(jnp.zeros((problems, features)), joints, mode, joints, mode, joints)
+    keys = jax.random.split(jax.random.key(0), problems)
+
+    def call(params: dict, cond: Cond, keys: jax.Array) -> Any:
+        return draw(config, params, cond, keys, segments)
+
+    program, seconds = compiled(call, weights.params, cond, keys, options={})
+    return Side(name, program, problems * segments, seconds)
+
+
+def encoding(upper: Weights) -> Side:
+    """The predictor on one picture, which gives targets and features: once a phase."""
+    config = upper.config
+    image = jnp.zeros((1, *IMAGE_SHAPE), jnp.uint8)
+    q, gripper = jnp.zeros((1, len(config.q_min))), jnp.zeros(1, jnp.int32)
+    program, seconds = compiled(
+        partial(predict, config), upper.params, image, q, gripper, options={}
+    )
+    return Side("predictor, once a phase", program, 1, seconds)
+
+
+def torch_peer(config: SamplerConfig) -> list[Side]:
+    """DDIM 25 of the same network in PyTorch, where it is installed."""
+    if absent("torch"):
+        return []
+    return torch_sides(replace(config, num_inference_steps=25))
+
+
+def times(setting: str, sides: list[Side], rounds: int) -> dict[str, dict[str, Any]]:
+    """Milliseconds per proposal of each side, and as a share of DDIM 25's."""
+    rows = take_turns(PART, setting, "proposals/s", sides, rounds)
+    found = {row.side: milliseconds(row) for row in rows}
+    base = found.get(DDIM)
+    if base is not None:
+        for row in found.values():
+            row["normalized"] = row["median"] / base["median"]
+    return found
+
+
+def milliseconds(row: Row) -> dict[str, Any]:
+    """A row of rates as times."""
+    assert row.median is not None
+    assert row.p10 is not None
+    assert row.p90 is not None
+    return {
+        "median": 1e3 / row.median,
+        "p10": 1e3 / row.p90,
+        "p90": 1e3 / row.p10,
+        "size": row.size,
+        **row.more,
+    }
+
+
+def checks(measured: dict[str, dict[str, dict[str, Any]]]) -> dict[str, float]:
+    """What the table must show: shares of times of the same run."""
+    one, phase = measured[ONE], measured[PHASE]
+    found = {}
+    for setting, rows in ((ONE, one), (PAPER, measured[PAPER])):
+        if DDIM in rows:
+            share = rows["DDIM 10"]["median"] / rows[DDIM]["median"]
+            found[f"DDIM 10 / DDIM 25, {setting}"] = share
+    peers = [row["median"] for name, row in one.items() if name.startswith("PyTorch")]
+    if peers and DDIM in phase:
+        found["PyTorch at batch 1 / DDIM 25 of a phase's bank"] = (
+            min(peers) / phase[DDIM]["median"]
+        )
+    return found
+
+
+def show(result: dict[str, Any]) -> None:
+    """Prints the table, the paper's figures beside ours."""
+    for setting, rows in result["settings"].items():
+        print(
+            f"\n{setting:30} {'ms, median (p10 to p90)':>30} {'ours':>7} {'paper':>6}"
+        )
+        for name, row in rows.items():
+            spread = f"{row['median']:.4g} ({row['p10']:.4g} to {row['p90']:.4g})"
+            share = f"{row['normalized']:.3f}" if "normalized" in row else ""
+            paper = f"{PUBLISHED[name]:.2f}" if name in PUBLISHED else ""
+            print(f"{name:30} {spread:>30} {share:>7} {paper:>6}")
+    for name, note in result["notes"].items():
+        print(f"{name}: {note}")
+    print()
+    for name, value in result["checks"].items():
+        print(f"{name}: {value:.3g}")
+
+
+if __name__ == "__main__":
+    run_script(main, Args)

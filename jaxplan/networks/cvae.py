@@ -1,0 +1,43 @@
+"""The CVAE sampler's network (Ichter, Harrison and Pavone, ICRA 2018), over segments."""
+
+import flax.linen as nn
+import jax
+import jax.numpy as jnp
+
+from jaxplan.config import CvaeConfig
+from jaxplan.networks.condition import Cond, Condition
+from jaxplan.networks.conditioned_mlp import ConditionedMlp
+
+
+class CvaeNetwork(nn.Module):
+    """q(z | x_0, cond) in training, and the mean of p(x_0 | z, cond)."""
+
+    config: CvaeConfig
+
+    def setup(self) -> None:
+        config = self.config
+        self.condition = Condition(config)
+        self.recognition = ConditionedMlp(config.hidden, 2 * config.latent, nn.relu)
+        self.decoder = ConditionedMlp(config.hidden, len(config.q_min) + 1, nn.relu)
+
+    def cond(self, cond: Cond) -> jax.Array:
+        """The vector of a condition, [..., cond_features]."""
+        return self.condition(cond)
+
+    def recognize(self, x_0: jax.Array, cond: jax.Array) -> tuple[jax.Array, jax.Array]:
+        """Mean and log variance of z [..., latent], for x_0 [..., 8] and vectors."""
+        mean, log_var = jnp.split(self.recognition(x_0, cond), 2, axis=-1)
+        return mean, log_var
+
+    def generate(self, z: jax.Array, cond: jax.Array) -> jax.Array:
+        """x_0 [..., 8] for z [..., latent] and vectors broadcastable to [..., C]."""
+        return self.decoder(z, cond)
+
+    def __call__(self, x_0: jax.Array, cond: Cond) -> jax.Array:
+        """Everything once, for initialisation."""
+        z, _ = self.recognize(x_0, self.cond(cond))
+        return self.draw(z, cond)
+
+    def draw(self, z: jax.Array, cond: Cond) -> jax.Array:
+        """What drawing needs once, for initialisation."""
+        return self.generate(z, self.cond(cond))

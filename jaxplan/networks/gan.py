@@ -1,0 +1,74 @@
+"""The conditional GAN's two networks, over segments; each has a condition network."""
+
+import flax.linen as nn
+import jax
+import jax.numpy as jnp
+
+from jaxplan.config import GanConfig
+from jaxplan.networks.condition import Cond, Condition
+from jaxplan.networks.conditioned_mlp import ConditionedMlp
+
+
+class GanNetwork(nn.Module):
+    """G(z, cond) and D(x_0, cond); their weights are `generator` and `discriminator`."""
+
+    config: GanConfig
+
+    def setup(self) -> None:
+        self.generator = Generator(self.config)
+        self.discriminator = Discriminator(self.config)
+
+    def cond(self, cond: Cond) -> jax.Array:
+        """The generator's vector of a condition, [..., cond_features]."""
+        return self.generator.cond(cond)
+
+    def generate(self, z: jax.Array, cond: jax.Array) -> jax.Array:
+        """x_0 [..., 8] for z [..., latent] and vectors broadcastable to [..., C]."""
+        return self.generator(z, cond)
+
+    def judge(self, x_0: jax.Array, cond: Cond) -> jax.Array:
+        """Logit [...] of x_0 [..., 8] being a true segment of the condition."""
+        return self.discriminator(x_0, cond)
+
+    def __call__(self, z: jax.Array, cond: Cond) -> jax.Array:
+        """Everything once, for initialisation."""
+        return self.judge(self.draw(z, cond), cond)
+
+    def draw(self, z: jax.Array, cond: Cond) -> jax.Array:
+        """What drawing needs once, for initialisation."""
+        return self.generate(z, self.cond(cond))
+
+
+class Generator(nn.Module):
+    """Its x_0 is a segment by construction: u of length 1, s within its bounds."""
+
+    config: GanConfig
+
+    def setup(self) -> None:
+        config = self.config
+        self.condition = Condition(config)
+        outputs = len(config.q_min) + 1
+        self.mlp = ConditionedMlp(config.generator, outputs, nn.leaky_relu)
+
+    def cond(self, cond: Cond) -> jax.Array:
+        return self.condition(cond)
+
+    def __call__(self, z: jax.Array, cond: jax.Array) -> jax.Array:
+        out = self.mlp(z, cond)
+        u, s = out[..., :-1], jnp.tanh(out[..., -1:])
+        square = jnp.sum(u * u, axis=-1, keepdims=True)
+        u = u * jnp.sqrt(u.shape[-1] / (square + 1e-6))
+        return jnp.concatenate([u, s], axis=-1)
+
+
+class Discriminator(nn.Module):
+    """True or drawn; without normalisation layers, since R1 needs a gradient per sample."""
+
+    config: GanConfig
+
+    def setup(self) -> None:
+        self.condition = Condition(self.config)
+        self.mlp = ConditionedMlp(self.config.discriminator, 1, nn.leaky_relu)
+
+    def __call__(self, x_0: jax.Array, cond: Cond) -> jax.Array:
+        return self.mlp(x_0, self.condition(cond))[..., 0]

@@ -1,0 +1,41 @@
+"""One door to all learned samplers, so that who asks need not know which one it is."""
+
+import jax
+
+from jaxplan.config import (
+    CvaeConfig,
+    FewStepConfig,
+    GanConfig,
+    SamplerConfig,
+    SegmentConfig,
+)
+from jaxplan.networks import Cond
+from jaxplan.planning.segment import Segment
+from jaxplan.samplers import diffusion, few_step, one_pass
+
+_DRAW = {
+    SamplerConfig: diffusion.draw,
+    FewStepConfig: few_step.draw,
+    CvaeConfig: one_pass.draw,
+    GanConfig: one_pass.draw,
+}
+
+
+def draw(
+    config: SegmentConfig, params: dict, cond: Cond, keys: jax.Array, n: int
+) -> Segment:
+    """`n` segments for each of P problems, in one batch.
+
+    Un-jitted; the caller jits it with `config` and `n` static.
+
+    Args:
+        config: The network that `params` belongs to; its type says which sampler.
+        params: Weights.
+        cond: Conditions with leading axis P.
+        keys: Typed keys [P]. Problem p's segments depend on its own key and condition only.
+        n: Segments per problem.
+
+    Returns:
+        Segment with direction [P, n, 7] and length [P, n] [rad].
+    """
+    return _DRAW[type(config)](config, params, cond, keys, n)
