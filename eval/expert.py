@@ -2,11 +2,10 @@
 
     python eval/expert.py --seeds 0:200 --out runs/expert.json
 
-Every seed counts. The problems that the episodes pose (about 14 each) are planned with uniform
-proposals; each path and each executed motion is then judged by C MuJoCo.
+Every seed counts. The problems that the episodes pose (about 14 each) are planned as for
+demonstrations; each path and each executed motion is then judged by C MuJoCo.
 """
 
-import dataclasses
 import json
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,16 +13,15 @@ from pathlib import Path
 from tqdm import tqdm
 
 from jaxplan.cli import run_script
-from jaxplan.config import PAPER_PLANNER, DemonstrationConfig, PlannerConfig
+from jaxplan.config import DemonstrationConfig
 from jaxplan.evaluation import parse_seeds, versions, wilson
 from jaxplan.evaluation.certification import Certification
 from jaxplan.evaluation.success import episode_json
-from jaxplan.motion import MotionPlanner
 from jaxplan.rollout import Targets, rollout
-from jaxplan.scene.panda import PANDA_LIMITS
 from jaxplan.tasks.mug.demonstrate import ExpertPolicy
 from jaxplan.tasks.mug.scene import Variant
 from jaxplan.tasks.mug.task import MugTask
+from jaxplan.tasks.mug.way import expert_planner
 
 
 @dataclass(frozen=True)
@@ -34,16 +32,15 @@ class Args:
     out: Path = Path("runs/expert.json")
     batch: int = 32
     variant: Variant = "plain"
-    planner: PlannerConfig = dataclasses.replace(PAPER_PLANNER, p_uniform=1.0)
 
 
 def main(args: Args) -> None:
     """Runs, prints, writes JSON."""
     seeds = parse_seeds(args.seeds)
     task = MugTask(min(args.batch, len(seeds)), variant=args.variant)
-    planner = MotionPlanner(task.planning_scene, PANDA_LIMITS, args.planner)
+    planner = expert_planner(task)
     policy = ExpertPolicy(task, DemonstrationConfig(noisy_episodes=0.0))
-    certification = Certification(planner)
+    certification = Certification(planner, task.planning_scene)
     records = []
     with tqdm(total=len(seeds), unit="episode") as bar:
         for first in range(0, len(seeds), task.batch):
@@ -63,6 +60,7 @@ def main(args: Args) -> None:
         "wilson_95": wilson(successes, len(records)),
         "planning": certification.summary(),
         "episodes": [episode_json(record) for record in records],
+        "variant": args.variant,
         "versions": versions(),
     }
     args.out.parent.mkdir(parents=True, exist_ok=True)

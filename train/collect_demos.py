@@ -1,7 +1,8 @@
 """Collects demonstrations: `python train/collect_demos.py --episodes 2000 --out data/mug`.
 
 Shards are written one by one and are byte-identical however often the run is killed and begun
-again; a finished collection has a manifest with the checksum of each.
+again; a finished collection has a manifest with the checksum of each, and a card (`CARD.md`) that
+says what is in it.
 """
 
 import dataclasses
@@ -11,11 +12,12 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from card import write_card
 from tqdm import tqdm
 
 from jaxplan import data
 from jaxplan.cli import run_script
-from jaxplan.config import PAPER_PLANNER, DemonstrationConfig
+from jaxplan.config import DemonstrationConfig
 from jaxplan.tasks.mug.scene import Variant
 
 
@@ -39,15 +41,13 @@ class Collector:
     """Makes shards in a process of its own."""
 
     def __init__(self, args: Args) -> None:
-        from jaxplan.motion import MotionPlanner
-        from jaxplan.scene.panda import PANDA_LIMITS
         from jaxplan.tasks.mug.demonstrate import ExpertPolicy
         from jaxplan.tasks.mug.task import MugTask
+        from jaxplan.tasks.mug.way import expert_planner
 
         self._args = args
         self._task = MugTask(args.shard_size, args.camera, variant=args.variant)
-        planner = dataclasses.replace(PAPER_PLANNER, p_uniform=1.0)
-        self._planner = MotionPlanner(self._task.planning_scene, PANDA_LIMITS, planner)
+        self._planner = expert_planner(self._task)
         self._policy = ExpertPolicy(self._task, args.demonstration)
 
     def shard(self, index: int) -> tuple[int, int]:
@@ -105,6 +105,7 @@ def main(args: Args) -> None:
     if missing:
         _collect(args, missing)
         data.write_manifest(args.out, settings)
+    write_card(args.out)
 
 
 def _collect(args: Args, missing: list[int]) -> None:

@@ -9,16 +9,21 @@ from jaxplan.collision import certify
 from jaxplan.motion import MotionPlanner
 from jaxplan.planning import Status
 from jaxplan.rollout import Phase
+from jaxplan.scene import Scene
 
 
 class Certification:
     """Listens to the outer loop and certifies every path, and every motion before it runs.
 
     The resolution is 0.01 rad; contacts deeper than 1 mm are refused.
+
+    Args:
+        planner: Whose paths are judged.
+        scene: In which; by default the planner's own.
     """
 
-    def __init__(self, planner: MotionPlanner) -> None:
-        self._scene = planner.scene
+    def __init__(self, planner: MotionPlanner, scene: Scene | None = None) -> None:
+        self._scene = planner.scene if scene is None else scene
         self.statuses: Counter[str] = Counter()
         self.refused: list[str] = []
         self.invalid: list[str] = []

@@ -1,46 +1,38 @@
 """What the cluttered variant adds: obstacles across the straight lines of the long phases.
 
-Easy phases tell nothing about a sampler. These obstacles leave every keyframe of the expert
-free, and what the wrist camera looks for in sight, but stand where the arm or the mug would
-pass on the straight line in joint space between two keyframes that lie far apart.
+Easy phases tell nothing about a sampler. These obstacles leave every keyframe of the expert free
+and hide nothing from the wrist camera at the keyframes, but stand where the arm or the mug passes
+on the straight line in joint space between keyframes that lie far apart:
+
+    obstacle         toward rim grasp   toward release   toward handle   toward box
+    front_board      wrist, from above
+    side_board                          forearm          forearm
+    partition                                                            the mug
+
+Each goes on outward, so that there is one way around it, inside or above, and demonstrations
+agree on it.
 """
 
 from typing import Any, NamedTuple
 
 import mujoco
+import numpy as np
 
-RADIUS = 0.012
-"""Of a rod [m]."""
-TOP = 0.90
-"""Where hanging rods end [m]: above anything that the arm does."""
+from jaxplan.scene import Scene
 
 
-class Rod(NamedTuple):
-    """A vertical capsule that hangs from above, or stands on the table."""
+class Obstacle(NamedTuple):
+    """A box, parallel to the axes, between two corners [m]."""
 
     name: str
-    x: float
-    y: float
-    low: float
-    high: float = TOP
-    """All [m]."""
+    low: tuple[float, float, float]
+    high: tuple[float, float, float]
 
 
-class Wall(NamedTuple):
-    """A box that stands on the table."""
-
-    name: str
-    x: tuple[float, float]
-    y: tuple[float, float]
-    height: float
-    """All [m]."""
-
-
-OBSTACLES: tuple[Rod | Wall, ...] = (
-    Rod("lamp", x=0.53, y=-0.05, low=0.46),
-    Rod("shoulder_rod", x=0.37, y=-0.11, low=0.58),
-    Rod("front_rod", x=0.49, y=0.09, low=0.60),
-    Wall("partition", x=(0.44, 0.60), y=(-0.220, -0.204), height=0.14),
+OBSTACLES = (
+    Obstacle("front_board", low=(0.48, 0.085, 0.595), high=(0.75, 0.105, 0.90)),
+    Obstacle("side_board", low=(0.33, -0.35, 0.63), high=(0.35, -0.10, 0.90)),
+    Obstacle("partition", low=(0.40, -0.220, 0.0), high=(0.70, -0.204, 0.14)),
 )
 
 
@@ -52,8 +44,8 @@ def add_clutter(
 ) -> None:
     """Adds a body `clutter` to the scene.
 
-    It is a body of its own, so that no phase's allowed contacts (mug and table) allow its
-    contacts too.
+    It is a body of its own, so that the contacts that some phases allow, of the mug with the
+    table, do not allow any with obstacles.
 
     Args:
         scene: What is added to.
@@ -62,28 +54,21 @@ def add_clutter(
         visual: Of those that a camera sees.
     """
     scene.add_material(name="clutter", rgba=[0.55, 0.36, 0.30, 1], specular=0.2)
-    body = scene.worldbody.add_body(name="clutter")
-    for obstacle in OBSTACLES:
-        shape, look = _geom(obstacle), {"material": "clutter"}
-        name = obstacle.name
-        body.add_geom(name=name, **shape, **look, **physics)
-        body.add_geom(name=f"{name}_planning", **shape, **planning)
-        body.add_geom(name=f"{name}_visual", **shape, **look, **visual)
-
-
-def _geom(obstacle: Rod | Wall) -> dict[str, Any]:
-    """Type, position and size of an obstacle's geom."""
-    if isinstance(obstacle, Rod):
-        low, high = obstacle.low + RADIUS, obstacle.high - RADIUS
-        return {
-            "type": mujoco.mjtGeom.mjGEOM_CAPSULE,
-            "pos": [obstacle.x, obstacle.y, (low + high) / 2],
-            "size": [RADIUS, (high - low) / 2, 0],
+    body, look = scene.worldbody.add_body(name="clutter"), {"material": "clutter"}
+    for name, low, high in OBSTACLES:
+        corners = np.array([low, high])
+        box = {
+            "type": mujoco.mjtGeom.mjGEOM_BOX,
+            "pos": corners.mean(0),
+            "size": np.ptp(corners, axis=0) / 2,
         }
-    (x0, x1), (y0, y1) = obstacle.x, obstacle.y
-    half = [(x1 - x0) / 2, (y1 - y0) / 2, obstacle.height / 2]
-    return {
-        "type": mujoco.mjtGeom.mjGEOM_BOX,
-        "pos": [(x0 + x1) / 2, (y0 + y1) / 2, obstacle.height / 2],
-        "size": half,
-    }
+        body.add_geom(name=name, **box, **look, **physics)
+        body.add_geom(name=f"{name}_planning", **box, **planning)
+        body.add_geom(name=f"{name}_visual", **box, **look, **visual)
+
+
+def thickened(planning: Scene, by: float) -> Scene:
+    """The scene with every obstacle thicker by `by` [m] on each side."""
+    model = planning.mj_model
+    obstacle = model.geom_bodyid == planning.body_id("clutter")
+    return planning.replace(geom_size=planning.model.geom_size + by * obstacle[:, None])

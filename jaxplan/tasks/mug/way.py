@@ -1,0 +1,37 @@
+"""The ways that demonstrations go between keyframes.
+
+A sampler learns the average of what it is shown, so that demonstrations must agree on the way
+around an obstacle, and leave room beside it for a learned segment that is a little off. In the
+plain scene nearly every way is straight. In the cluttered one the expert searches on for the
+shortest way, among obstacles that it takes for thicker than they are.
+"""
+
+from dataclasses import replace
+
+from jaxplan.config import PAPER_PLANNER, PlannerConfig
+from jaxplan.motion import MotionPlanner
+from jaxplan.scene.panda import PANDA_LIMITS
+from jaxplan.tasks.mug.clutter import thickened
+from jaxplan.tasks.mug.scene import Variant
+from jaxplan.tasks.mug.task import MugTask
+
+PLANNERS: dict[Variant, PlannerConfig] = {
+    "plain": replace(PAPER_PLANNER, p_uniform=1.0),
+    "cluttered": replace(
+        PAPER_PLANNER,
+        method="ao_rrt_connect",
+        p_uniform=1.0,
+        max_expansions=2000,
+        workers=16,
+    ),
+}
+ROOM = 0.015
+"""What the expert adds to each side of an obstacle [m]."""
+
+
+def expert_planner(task: MugTask) -> MotionPlanner:
+    """The planner of demonstrations in a task's scene."""
+    scene = task.planning_scene
+    if task.variant == "cluttered":
+        scene = thickened(scene, ROOM)
+    return MotionPlanner(scene, PANDA_LIMITS, PLANNERS[task.variant])
