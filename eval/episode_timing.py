@@ -96,7 +96,7 @@ class Bench:
     ) -> None:
         self.problems, self.keys = study.problems, study.problems.keys()
         self.cond = study.cond
-        upper = study.upper
+        upper = study.predictor
         self._upper = jax.jit(
             lambda image, q, gripper: predict(
                 upper.config, upper.params, image, q, gripper

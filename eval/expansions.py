@@ -9,6 +9,7 @@ with its whole budget. Phases whose straight motion is not free are shown apart:
 tell nothing about a sampler.
 """
 
+import math
 import time
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -44,27 +45,29 @@ def main(args: Args) -> None:
     start = time.perf_counter()
     study = RecordedStudy(args)
     problems = study.problems
-    groups = [
-        Group("all phases", np.ones(len(problems.seed), bool)),
-        Group("blocked phases", problems.blocked),
-    ]
     tables: list[Table] = []
     shortfalls: list[str] = []
     bar = tqdm(total=len(BACKBONES) * len(METHODS), unit="search")
     for backbone in BACKBONES:
         counts: dict[str, Counts] = {}
+        rows = np.flatnonzero(problems.episode < (backbone.trials or math.inf))
+        some = problems.take(rows)
         for method in METHODS:
             weights = method.weights and study.weights(method.weights)
             if method.weights is None or weights:
                 config = planner(backbone, method)
-                answers = study.answers(config, weights or None)
+                answers = study.answers(config, weights or None, rows)
                 counts[method.name] = Counts(
-                    answers.expansions, answers.solved, problems.episode
+                    answers.expansions, answers.solved, some.episode
                 )
             bar.update()
+        groups = [
+            Group("all phases", np.ones(len(rows), bool)),
+            Group("blocked phases", some.blocked),
+        ]
         for group in groups:
             tables.append(compare(backbone, group, counts))
-        tables.append(per_toggle(backbone, problems, counts))
+        tables.append(per_toggle(backbone, some, counts))
         shortfalls += judge(backbone, args.variant, groups[1], counts)
     bar.close()
     seconds = time.perf_counter() - start

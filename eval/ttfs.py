@@ -21,6 +21,7 @@ from tqdm import tqdm
 from jaxplan.agent import BANK
 from jaxplan.cli import run_script
 from jaxplan.config import PAPER_PLANNER
+from jaxplan.evaluation.memo import code_digest
 from jaxplan.evaluation.statistics import bootstrap
 from jaxplan.evaluation.study import RecordedStudy, StudyArgs
 from jaxplan.evaluation.tables import Estimate, Result, Table
@@ -62,6 +63,7 @@ def main(args: Args) -> None:
         "p_uniform": args.p_uniform,
         "bank": args.bank,
         "machine": versions()["machine"],
+        "code": code_digest(),
     }
 
     def warm() -> Bench:

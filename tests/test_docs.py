@@ -1,7 +1,6 @@
 """What the documents say runs: their Python blocks, in order."""
 
 import importlib.util
-import json
 import re
 from pathlib import Path
 
@@ -26,34 +25,16 @@ def test_python_blocks_run(document, directory, monkeypatch):
         exec(compile(before + block[1], document, "exec"), names)
 
 
-def test_the_results_page_takes_what_the_benchmark_writes(tmp_path):
+def test_the_results_page_is_results_md(tmp_path):
     spec = importlib.util.spec_from_file_location(
         "results", ROOT / "docs" / "results.py"
     )
+    assert spec is not None
+    assert spec.loader is not None
     results = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(results)
-    row = {"part": "collision", "scene": "mug", "side": "jaxplan", "unit": "1/s"}
-    rows = [
-        row | {"median": 1.25e6},
-        row | {"side": "peer", "median": None, "note": "absent"},
-    ]
-    ratios = {
-        "mug: jaxplan / MuJoCo": {"value": 5.8, "least": 0.5, "against": "MuJoCo"}
-    }
-    result = {
-        "parts": {"collision": {"rows": rows, "ratios": ratios, "counts": {}}},
-        "versions": {"jax": "0.10.2"},
-    }
-    assert "No result" in results.tables(tmp_path)
-    (tmp_path / "benchmark.json").write_text(json.dumps(result))
-    page = results.on_page_markdown("x {{ results }}").replace("x ", "")
-    assert "{{" not in page
-    page = results.tables(tmp_path)
-    for line in (
-        "## benchmark",
-        "| mug | jaxplan | 1.25e+06 | 1/s |",
-        "| mug | peer | absent | 1/s |",
-        "| mug: jaxplan / MuJoCo | 5.8 |",
-        "jax 0.10.2",
-    ):
-        assert line in page.splitlines()
+    results.RESULTS = tmp_path / "RESULTS.md"
+    results.RESULTS.write_text("# Results\n\n| a |\n\n![b](docs/figures/b.png)\n")
+    assert results.on_page_markdown("no mark") == "no mark"
+    page = results.on_page_markdown("# Page\n\n{{ results }}\n")
+    assert page == "# Page\n\n\n| a |\n\n![b](figures/b.png)\n\n"

@@ -8,7 +8,8 @@ from typing import Any
 
 from jaxplan.data import write_atomic
 
-COMPUTES = ("planning", "collision", "samplers", "diffusion", "networks", "scene")
+PLANNING = ("planning", "collision", "scene")
+SAMPLING = (*PLANNING, "samplers", "diffusion", "networks")
 """Packages whose code decides what a piece's result is."""
 
 
@@ -20,11 +21,11 @@ class Memo:
     """
 
     def __init__(self, directory: Path = Path("runs/pieces")) -> None:
-        self._directory, self._code = directory, code_digest()
+        self._directory = directory
 
     def __call__(self, settings: dict[str, Any], make: Callable[[], Any]) -> Any:
-        """Reads the result if it is there, whole and of the present code; else makes it."""
-        key = json.dumps(settings | {"code": self._code}, sort_keys=True)
+        """Reads the result if it is there and whole; else makes it."""
+        key = json.dumps(settings, sort_keys=True)
         path = self._directory / f"{hashlib.sha256(key.encode()).hexdigest()[:24]}.json"
         if path.is_file():
             try:
@@ -38,11 +39,11 @@ class Memo:
         return result
 
 
-def code_digest() -> str:
-    """Of the source in `COMPUTES`: a change to a planner is another measurement."""
+def code_digest(packages: tuple[str, ...] = SAMPLING) -> str:
+    """Of their source, for the settings: a change to a planner is another measurement."""
     digest = hashlib.sha256()
     package = Path(__file__).parents[1]
-    for name in COMPUTES:
+    for name in packages:
         for file in sorted((package / name).rglob("*.py")):
             digest.update(file.read_bytes())
     return digest.hexdigest()[:16]

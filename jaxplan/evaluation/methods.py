@@ -28,6 +28,8 @@ class Backbone(NamedTuple):
     name: str
     planner: dict[str, Any]
     note: str
+    trials: int | None = None
+    """The first so many; None = all."""
 
 
 OURS = "ours (diffusion, DDIM-25)"
@@ -62,7 +64,8 @@ BACKBONES = (
             "uniform_mode": "independent",
         },
         "Algorithm 1 to the letter: one tree, no straight motion to the goal, uniform "
-        "segments whose direction is independent of the sample.",
+        "segments whose direction is independent of the sample. 100 trials.",
+        100,
     ),
 )
 

@@ -1,8 +1,8 @@
-"""Recording phase problems: the networks predict, a uniform planner drives.
+"""Recording phase problems: the expert or the upper network predicts, a uniform planner drives.
 
-No learned sampler has a part in it, so that none is favoured; the upper network is the one
-that all of them serve (section 5.5: "we replace only the lower planner while keeping the
-upper network fixed"). Where a scene has no upper network, the expert predicts.
+No learned sampler has a part in it, so that none is favoured; whoever predicts is the same
+for all of them (section 5.5: "we replace only the lower planner while keeping the upper
+network fixed"). The expert's problems depend on the seeds alone.
 """
 
 import dataclasses

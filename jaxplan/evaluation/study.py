@@ -3,14 +3,14 @@
 import dataclasses
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from tqdm import tqdm
 
 from jaxplan.agent import BANK
 from jaxplan.config import PlannerConfig
-from jaxplan.evaluation.memo import Memo
+from jaxplan.evaluation.memo import PLANNING, SAMPLING, Memo, code_digest
 from jaxplan.evaluation.problems import Problems
 from jaxplan.evaluation.recording import record
 from jaxplan.evaluation.searches import Answers, Banks, Searcher, conditions
@@ -34,6 +34,8 @@ class StudyArgs:
     """Of the scene."""
     seeds: str = "300000:300500"
     """FIRST:END, one trial each; training never saw seeds from 100000 on."""
+    upper: Literal["expert", "network"] = "expert"
+    """Who says where phases lead. The expert's problems depend on the seeds alone."""
     weights: Path | None = None
     """Directory with the predictor and the samplers; by default the shipped ones."""
     quick: bool = False
@@ -65,7 +67,8 @@ class RecordedStudy:
         self.args = args
         self.directory = args.weights or _shipped(args.variant)
         self.memo = memo or Memo()
-        upper = self.weights("predictor")
+        self.predictor = load_weights("predictor", self.directory)
+        upper = self.predictor if args.upper == "network" else None
         with tqdm(total=len(args.range), unit="episode", desc="problems") as bar:
             recorded, self.name = record(
                 args.variant, args.range, upper, progress=bar.update
@@ -73,7 +76,6 @@ class RecordedStudy:
         self.trials = len(args.range)
         self.problems: Problems = recorded.take(np.flatnonzero(recorded.success))
         self.scene = Scene.from_mjcf(build("planning", variant=args.variant))
-        self.upper = upper or load_weights("predictor")
         self._cond: Cond | None = None
         self._banks: dict[Any, Banks] = {}
         self._searchers: dict[PlannerConfig, Searcher] = {}
@@ -98,7 +100,7 @@ class RecordedStudy:
             "successful_trials": len(np.unique(self.problems.seed)),
             "phases": len(self.problems.seed),
             "blocked_share": float(np.mean(self.problems.blocked)),
-            "upper": "expert" if found["predictor"] is None else "network",
+            "upper": self.args.upper,
             "weights": {
                 name: each and each.info["sha256"] for name, each in found.items()
             },
@@ -129,7 +131,8 @@ class RecordedStudy:
             "sampler": sampler and sampler.info["sha256"],
             "mask": mask,
             "changes": changes,
-            "bank": BANK,
+            "bank": sampler and BANK,
+            "code": code_digest(SAMPLING if sampler else PLANNING),
         }
         pieces = []
         for first in range(0, len(every), PIECE):
@@ -147,7 +150,7 @@ class RecordedStudy:
     def cond(self) -> Cond:
         """What the samplers are told of each problem."""
         if self._cond is None:
-            self._cond = conditions(self.problems, self.upper)
+            self._cond = conditions(self.problems, self.predictor)
         return self._cond
 
     def _bank(self, sampler: Weights, mask: str, changes: dict[str, Any]) -> Banks:
