@@ -5,7 +5,7 @@ from jaxplan.collision import World as World
 from jaxplan.collision import make_world as make_world
 from jaxplan.config import PlannerConfig as PlannerConfig
 from jaxplan.config import TrajectoryConfig as TrajectoryConfig
-from jaxplan.planner import Plan as Plan
+from jaxplan.plan import Plan as Plan
 from jaxplan.planner import Planner as Planner
 from jaxplan.planning import Segment as Segment
 from jaxplan.planning import Status as Status

@@ -14,17 +14,19 @@ import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import cached_property, partial
-from typing import Any, NamedTuple
+from typing import Any
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 from numpy.typing import ArrayLike
 
-from jaxplan import collision
+from jaxplan import collision, questions
 from jaxplan.collision import Certificate, World, make_world
 from jaxplan.config import PlannerConfig, TrajectoryConfig
+from jaxplan.plan import Plan, Timed
 from jaxplan.planning import PlanResult, Segment, Status, make_planner
+from jaxplan.reason import no_path
 from jaxplan.scene import Scene
 from jaxplan.trajectory import Rung, make_trajectory
 
@@ -36,50 +38,6 @@ BANK = 64
 """Segments that a sampler is asked for at a time."""
 UNLIMITED = {"hinge": 2 * np.pi, "slide": 10.0}
 """How far from 0 a joint without limits is searched [rad or m]."""
-
-
-@dataclasses.dataclass(frozen=True, eq=False)
-class Plan:
-    """The answer to one question."""
-
-    status: Status
-    path: np.ndarray
-    """`[n, d]` waypoints from q_start to q_goal [rad]; where the budget was exhausted, to the
-    node nearest to the goal; without rows where nothing was searched."""
-    expansions: int
-    checks: int
-    """Configurations of motions that were checked."""
-    time: float
-    """Wall time of the search [s]; in a batch, of the whole batch."""
-    reason: str
-    """Why there is no path, in a line; empty where there is one."""
-    seed: int
-    world: World
-
-    @property
-    def solved(self) -> bool:
-        """Whether the path leads to the goal."""
-        return self.status == Status.SOLVED
-
-    @property
-    def length(self) -> float:
-        """Of the path, in joint space [rad]."""
-        return float(np.linalg.norm(np.diff(self.path, axis=0), axis=1).sum())
-
-
-class Timed(NamedTuple):
-    """A motion from rest to rest, sampled at the control period."""
-
-    t: np.ndarray
-    """`[T]` [s], from 0."""
-    q: np.ndarray
-    """`[T, d]` [rad]."""
-    qd: np.ndarray
-    """`[T, d]` [rad/s]."""
-    qdd: np.ndarray
-    """`[T, d]` [rad/s^2]; the one that holds from each sample on."""
-    free: bool
-    """Every sample is; false only if the world has changed since the plan was made."""
 
 
 class Planner:
@@ -115,9 +73,9 @@ class Planner:
     ) -> None:
         self.scene, self.config = scene, config
         self._trajectory, self._sampler = trajectory, sampler
-        d = len(scene.joints)
-        self._velocity = _most(velocity, d, "velocity")
-        self._acceleration = _most(acceleration, d, "acceleration")
+        self._d = d = len(scene.joints)
+        self._velocity = questions.most(velocity, d, "velocity")
+        self._acceleration = questions.most(acceleration, d, "acceleration")
         far = np.array([UNLIMITED[scene.joint_kind(name)] for name in scene.joints])
         self.q_min, self.q_max = (
             np.clip(np.asarray(own if given is None else given, float), -far, far)
@@ -150,8 +108,8 @@ class Planner:
         Raises:
             ValueError: An argument of the wrong shape or type.
         """
-        start = _rows(q_start, 1, self, "q_start")[None]
-        goal = _rows(q_goal, 1, self, "q_goal")[None]
+        start = questions.rows(q_start, 1, self._d, "q_start")[None]
+        goal = questions.rows(q_goal, 1, self._d, "q_goal")[None]
         return self._plan(start, goal, [seed], world)[0]
 
     def plan_batch(
@@ -173,7 +131,7 @@ class Planner:
             ValueError: An argument of the wrong shape or type.
         """
         q_starts, q_goals = (
-            _rows(q, 2, self, n)
+            questions.rows(q, 2, self._d, n)
             for q, n in ((q_starts, "q_starts"), (q_goals, "q_goals"))
         )
         seeds = list(range(len(q_starts))) if seeds is None else list(seeds)
@@ -182,7 +140,7 @@ class Planner:
             raise ValueError(f"q_starts, q_goals and seeds have {sizes} rows")
         if worlds is None or isinstance(worlds, World):
             return self._plan(q_starts, q_goals, seeds, worlds)
-        rows = [self._checked(world, ()) for world in worlds]
+        rows = [questions.world_of(world, self.empty_world, ()) for world in worlds]
         if len(rows) != len(seeds):
             raise ValueError(f"{len(rows)} worlds for {len(seeds)} questions")
         stacked = (
@@ -245,9 +203,8 @@ class Planner:
             world: The model's own where None.
         """
         q = np.asarray(qs, np.float32)
-        if q.ndim < 1 or q.shape[-1] != len(self.scene.joints):
-            joints = len(self.scene.joints)
-            raise ValueError(f"qs has shape {q.shape}, expected (..., {joints})")
+        if q.ndim < 1 or q.shape[-1] != self._d:
+            raise ValueError(f"qs has shape {q.shape}, expected (..., {self._d})")
         world = self.empty_world if world is None else world
         return np.asarray(self._clearance(world, q))
 
@@ -270,14 +227,9 @@ class Planner:
         world: World | None,
     ) -> list[Plan]:
         """Plans for rows `[P, d]`; leaves of the world have a leading axis or none."""
-        count = len(seeds)
-        for seed in seeds:
-            if not (isinstance(seed, int | np.integer) and 0 <= seed < 2**32):
-                raise ValueError(
-                    f"seed {seed!r}, expected an integer from 0 to 2^32 - 1"
-                )
+        count = len(questions.seeds_of(seeds))
         empty = self.empty_world
-        world = self._checked(empty if world is None else world, (count,))
+        world = questions.world_of(empty if world is None else world, empty, (count,))
         own = bool(world.passive.ndim > empty.passive.ndim)
         if not count:
             return []
@@ -307,34 +259,16 @@ class Planner:
                     seed=seeds[row],
                     world=here,
                 )
-                reason = self._reason(plan, q_start[row], q_goal[row])
+                reason = no_path(
+                    self.scene,
+                    plan,
+                    q_start[row],
+                    q_goal[row],
+                    (self.q_min, self.q_max),
+                    self.config.margin,
+                )
                 plans[row] = dataclasses.replace(plan, reason=reason)
         return [plans[row] for row in range(count)]
-
-    def _checked(self, world: World, batch: tuple[int, ...]) -> World:
-        """The world in NumPy; all of its leaves have leading axes `batch`, or none has any."""
-        if not isinstance(world, World):
-            raise ValueError(f"{type(world).__name__} is not a World, see make_world")
-        leaves: list[Any] = []
-        ours = self.empty_world
-        for name, leaf, own in zip(World._fields, world, ours, strict=True):
-            try:
-                leaves.append(np.asarray(leaf, own.dtype))
-            except (TypeError, ValueError, OverflowError) as error:
-                raise ValueError(f"world.{name} is not an array: {error}") from None
-            if leaves[-1].shape not in (own.shape, (*batch, *own.shape)):
-                wanted = " or ".join(
-                    sorted({str(own.shape), str((*batch, *own.shape))})
-                )
-                raise ValueError(
-                    f"world.{name} has shape {leaves[-1].shape}, expected {wanted}"
-                )
-        if (leaves[-1] < 0).any():
-            raise ValueError("world.slot_size has a negative size")
-        if all(leaf.shape == own.shape for leaf, own in zip(leaves, ours, strict=True)):
-            return World(*leaves)
-        shapes = [(*batch, *own.shape) for own in ours]
-        return World(*map(np.broadcast_to, leaves, shapes))  # type: ignore[arg-type]
 
     def _search_rows(
         self,
@@ -400,50 +334,6 @@ class Planner:
 
         return _jit(jax.vmap(bank))
 
-    def _reason(self, plan: Plan, q_start: np.ndarray, q_goal: np.ndarray) -> str:
-        """Why there is no path, in a line."""
-        if plan.status == Status.BUDGET_EXHAUSTED:
-            gap = np.linalg.norm(plan.path[-1] - q_goal)
-            return (
-                f"no path after {plan.expansions} expansions; "
-                f"the nearest node is {gap:.3f} rad from the goal"
-            )
-        ends = (("start", q_start), ("goal", q_goal))
-        if plan.status in (Status.START_IN_COLLISION, Status.GOAL_IN_COLLISION):
-            name, q = ends[plan.status == Status.GOAL_IN_COLLISION]
-            return f"{name} in collision: {self._contact(plan.world, q)}"
-        if plan.status == Status.OUT_OF_LIMITS:
-            over = [np.maximum(self.q_min - q, q - self.q_max) for _, q in ends]
-            name, q = ends[int(over[1].max() > over[0].max())]
-            j = int(np.argmax(np.maximum(*over)))
-            return (
-                f"{name} out of limits: joint {self.scene.joints[j]!r} at {q[j]:.4f}, "
-                f"limits {self.q_min[j]:.4f} to {self.q_max[j]:.4f}"
-            )
-        if plan.status == Status.INVALID_INPUT:
-            for name, q in ends:
-                for j in np.flatnonzero(~np.isfinite(q)):
-                    return f"{name} is not finite: joint {self.scene.joints[j]!r} is {q[j]}"
-        return ""
-
-    def _contact(self, world: World, q: np.ndarray) -> str:
-        """The closest pair at q, by name, and how deep it is."""
-        if not all(np.isfinite(np.asarray(leaf)).all() for leaf in world):
-            return "the world has values that are not finite"
-        poses = np.concatenate([world.object_pose, world.slot_pose])
-        if not poses[:, 3:].any(-1).all():
-            return "the world has a quaternion of zeros"
-        pair, distance = collision.closest_pair(self.scene, world, q, 0.01)
-        if pair is None:
-            return "nothing within 10 mm by C MuJoCo"
-        if distance >= 0:
-            margin = 1000 * self.config.margin
-            return (
-                f"{pair[0]} and {pair[1]} are {1000 * distance:.2f} mm apart, "
-                f"margin {margin:.2f} mm"
-            )
-        return f"{pair[0]} and {pair[1]}, {-1000 * distance:.2f} mm deep"
-
 
 _jit: Any = partial(jax.jit, compiler_options=collision.XLA_OPTIONS)
 
@@ -458,31 +348,3 @@ def _parts(count: int) -> list[np.ndarray]:
     cores = os.cpu_count() or 1
     threads = min(cores, count // 16) if jax.default_backend() == "cpu" else 1
     return [np.arange(count)[i :: max(threads, 1)] for i in range(max(threads, 1))]
-
-
-def _most(value: ArrayLike, d: int, name: str) -> np.ndarray:
-    """`[d]` limits, checked."""
-    try:
-        limits = np.broadcast_to(np.asarray(value, float), d)
-    except (TypeError, ValueError, OverflowError):
-        raise ValueError(f"{name} {value!r}, expected a number or {d}") from None
-    if not ((limits > 0) & np.isfinite(limits)).all():
-        raise ValueError(f"{name} {value}, expected more than 0")
-    return limits
-
-
-def _rows(q: ArrayLike, axes: int, planner: Planner, name: str) -> np.ndarray:
-    """q as float32, checked."""
-    try:
-        rows = np.asarray(q)
-        rows = rows.astype(
-            np.float64, casting="unsafe" if rows.dtype == object else "same_kind"
-        )
-    except (TypeError, ValueError, OverflowError) as error:
-        raise ValueError(f"{name} is not an array of numbers: {error}") from None
-    d = len(planner.scene.joints)
-    if rows.ndim != axes or rows.shape[-1] != d:
-        expected = f"({d},)" if axes == 1 else f"(problems, {d})"
-        raise ValueError(f"{name} has shape {rows.shape}, expected {expected}")
-    with np.errstate(over="ignore"):
-        return rows.astype(np.float32)

@@ -10,7 +10,8 @@ import numpy as np
 from jaxplan.collision import Certificate
 from jaxplan.commands.model import Pose, read_pose, read_scene, with_joints, world_at
 from jaxplan.config import PlannerConfig
-from jaxplan.planner import Plan, Planner, Timed
+from jaxplan.plan import Plan, Timed
+from jaxplan.planner import Planner
 from jaxplan.provenance import versions
 from jaxplan.scene import Scene
 from jaxplan.simulation.video import FPS, film_motion
