@@ -47,6 +47,8 @@ class _State(NamedTuple):
     """The point of their triangle next to the origin, each `[...]`."""
     squared: jax.Array
     """Its squared distance [m^2]; exactly 0 where the set holds the origin."""
+    apart: jax.Array
+    """1 where a plane was found between the set and the origin, at the reach or beyond."""
     steps: jax.Array
     open: jax.Array
     """Whether some set is not settled."""
@@ -64,8 +66,10 @@ def nearest_point(
 
     Returns:
         Three coordinates `[...]` [m], and `[...]` [m^2], exactly 0 where the set holds
-        the origin.
+        the origin or rounding leaves it open. With a reach, the square is above that of
+        the reach only where a plane proves it.
     """
+    limit = jnp.zeros_like(start[0]) if reach is None else reach
 
     def step(state: _State) -> _State:
         corners, nearest, squared = state.corners, state.nearest, state.squared
@@ -78,15 +82,16 @@ def nearest_point(
         least = dot(inside, inside)
         least = jnp.where(least < contact, 0.0, least)
         progress = dot(nearest, new)
+        apart = (progress > 0) & (progress * progress > limit * limit * squared)
         open = better & (squared - progress > PRECISION * jnp.sqrt(squared))
         if reach is not None:
-            apart = (progress > 0) & (progress * progress > reach * reach * squared)
-            open &= (squared > reach * reach) & ~apart
+            open &= (squared > limit * limit) & ~apart
         return _State(
             # A corner without weight makes room for the new one.
             [where(better & (weights[i] == 0), new, corners[i]) for i in range(3)],
             where(better, inside, nearest),
             jnp.where(better, least, squared),
+            jnp.where(apart, 1.0, state.apart),
             state.steps + 1,
             # A maximum of floats is vectorised, `any` is not.
             jnp.max(jnp.where(open, 1.0, 0.0)),
@@ -95,9 +100,12 @@ def nearest_point(
     def unsettled(state: _State) -> jax.Array:
         return (state.open > 0) & (state.steps < MAX_STEPS)
 
-    first = _State([start] * 3, start, dot(start, start), jnp.array(0), jnp.array(1.0))
+    square, zero = dot(start, start), jnp.zeros_like(start[0])
+    first = _State([start] * 3, start, square, zero, jnp.array(0), jnp.array(1.0))
     last = jax.lax.while_loop(unsettled, step, first)
-    return last.nearest, last.squared
+    # Searches that stall in flat tetrahedra have found a near point, and no proof.
+    unproved = smaller(last.squared, limit * limit)
+    return last.nearest, jnp.where(last.apart > 0, last.squared, unproved)
 
 
 def _next_to_origin(

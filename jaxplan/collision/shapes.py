@@ -155,7 +155,10 @@ def once(values: Values) -> Values:
     """
     if jax.default_backend() != "cpu":
         return jax.lax.optimization_barrier(values)
-    always = jax.tree.leaves(values)[0].reshape(-1)[0] < jnp.inf
+    # No leaf is a constant alone, of which XLA would see that the condition holds; nothing
+    # that is computed has these bits.
+    first = sum(leaf.reshape(-1)[0] for leaf in jax.tree.leaves(values))
+    always = jax.lax.bitcast_convert_type(first, jnp.int32) != 0x7FC0BEEF
     zeros = partial(jax.tree.map, jnp.zeros_like, values)
     return jax.lax.cond(always, lambda: values, zeros)
 
