@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+import os
 import runpy
 import subprocess
 import sys
@@ -266,6 +267,43 @@ def test_non_finite_loss_keeps_the_last_good_checkpoint(tmp_path):
     kept = checkpoint.restore(store, 10, like)
     assert int(kept.step) == 10
     assert np.isfinite(kept.params["w"])
+
+
+PARALLEL = """
+import jax, numpy as np, sys
+import test_learning as t
+from pathlib import Path
+assert len(jax.devices()) == 2
+state, _ = t.toy(t.TOY, Path(sys.argv[1]))
+assert len(state.params["w"].sharding.device_set) == 2
+"""
+
+
+def test_two_devices_learn_what_one_does(tmp_path):
+    """Data-parallel over two devices of the host: the same losses, up to rounding."""
+    toy(TOY, tmp_path / "one")
+    done = subprocess.run(
+        [sys.executable, "-c", PARALLEL, str(tmp_path / "two")],
+        env={
+            **os.environ,
+            "PYTHONPATH": os.pathsep.join(
+                [str(CONFIGS.parent), str(Path(__file__).parent)]
+            ),
+            "XLA_FLAGS": "--xla_force_host_platform_device_count=2",
+        },
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr[-2000:]
+
+    def losses_of(run):
+        rows = map(
+            json.loads, (tmp_path / run / "metrics.jsonl").read_text().splitlines()
+        )
+        return [row["loss"] for row in rows if "loss" in row]
+
+    np.testing.assert_allclose(losses_of("two"), losses_of("one"), rtol=1e-5)
 
 
 def test_a_run_is_not_resumed_with_other_settings(tmp_path):

@@ -17,6 +17,7 @@ from tqdm import tqdm
 from jaxplan.config import TrainConfig
 from jaxplan.data import write_atomic
 from jaxplan.learning import checkpoint
+from jaxplan.learning.data_parallel import Devices
 from jaxplan.learning.train_state import (
     Loss,
     Params,
@@ -36,7 +37,7 @@ class TrainingDiverged(ValueError):
 
 
 class RunError(ValueError):
-    """The run's directory belongs to another run."""
+    """The run's directory belongs to another run, or its settings cannot be met."""
 
 
 def fit(
@@ -49,6 +50,9 @@ def fit(
     validate: Callable[[Params], Metrics],
 ) -> tuple[TrainState, Metrics]:
     """Trains from the run's newest checkpoint, or from `params`, to `config.steps`.
+
+    Each batch is split evenly among all devices; the weights are the same as on one, up to
+    rounding.
 
     Args:
         config: Steps, batch size, optimiser, intervals, seed.
@@ -64,10 +68,15 @@ def fit(
 
     Raises:
         TrainingDiverged: Not finite any more; the last good checkpoint is kept.
-        RunError: `run` was begun with other settings.
+        RunError: `run` was begun with other settings, or a batch cannot be split evenly.
     """
+    devices = Devices()
+    if min(config.batch_size, len(rows)) % devices.count:
+        raise RunError(
+            f"batch_size {config.batch_size} cannot be split among {devices.count} devices"
+        )
     tx = optimizer(config.optimizer, config.steps)
-    state = init_state(params, tx)
+    state = devices.replicate(init_state(params, tx))
     _claim(run, config)
     store = run / "checkpoints"
     if (last := checkpoint.latest(store)) is not None:
@@ -83,7 +92,7 @@ def fit(
     bar = tqdm(total=config.steps, initial=first, desc=config.name, unit="step")
     with bar, (run / "metrics.jsonl").open("a") as log:
         for step in range(first, config.steps):
-            batch = gather(rows_of_step(config, rows, step))
+            batch = devices.split(gather(rows_of_step(config, rows, step)))
             state, metrics = step_fn(state, key, batch)
             done, last_step = step + 1, step + 1 == config.steps
             if done % config.log_every == 0 or last_step:
@@ -94,7 +103,9 @@ def fit(
                 )
                 _write(log, {"step": done, **values, "examples_per_second": rate})
                 bar.update(done - bar.n)
-                bar.set_postfix(loss=f"{values['loss']:.2e}", refresh=False)
+                bar.set_postfix_str(
+                    f"loss {values['loss']:.2e}, {rate:.0f} examples/s", refresh=False
+                )
             if done % config.validate_every == 0 or last_step:
                 measured = validate(state.ema_params)
                 _write(

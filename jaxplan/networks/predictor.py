@@ -7,6 +7,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxplan.config import PredictorConfig
+from jaxplan.networks.hand_camera import camera_pose, on_plane
 from jaxplan.networks.joints import normalize, unnormalize
 from jaxplan.networks.resnet import Encoder
 
@@ -46,11 +47,17 @@ class Predictor(nn.Module):
     ) -> Prediction:
         """`image` u8 [..., 88, 136, 3], `q` [..., 7] [rad], `gripper` [...] 0 or 1."""
         config = self.config
-        features = Encoder(config.encoder, name="encoder")(image)
+        features, keypoints = Encoder(config.encoder, name="encoder")(image)
         state = state_vector(q, gripper, config.q_min, config.q_max)
         for _ in range(2):
             state = nn.relu(nn.Dense(config.state_features)(state))
-        shared = jnp.concatenate([nn.LayerNorm()(features), state], axis=-1)
+        inputs = [nn.LayerNorm()(features), state]
+        if config.camera is not None:
+            points = on_plane(config.camera, keypoints, q)
+            position, axes = camera_pose(config.camera, q)
+            columns = points, position, axes
+            inputs += [x.reshape(*q.shape[:-1], -1) for x in columns]
+        shared = jnp.concatenate(inputs, axis=-1)
         for _ in range(2):
             shared = nn.relu(nn.Dense(config.hidden)(shared))
 

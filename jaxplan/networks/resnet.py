@@ -5,7 +5,7 @@ Padding, initialisation and epsilon follow torchvision's ResNet, so that `last_s
 """
 
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import flax.linen as nn
 import jax
@@ -45,17 +45,27 @@ class ResidualBlock(nn.Module):
         return nn.relu(h + x)
 
 
+class Encoding(NamedTuple):
+    """What an image says."""
+
+    features: jax.Array
+    """[..., F]."""
+    keypoints: jax.Array
+    """[..., K, 2], x and y in [-1, 1]."""
+
+
 class Encoder(nn.Module):
-    """Image to feature vector: u8 [..., H, W, 3] to f32 [..., features]."""
+    """Image u8 [..., H, W, 3] to features and the keypoints behind them."""
 
     config: EncoderConfig
 
     @nn.compact
-    def __call__(self, image: jax.Array) -> jax.Array:
+    def __call__(self, image: jax.Array) -> Encoding:
         config = self.config
         batch = image.shape[:-3]
         x = image.reshape(-1, *image.shape[-3:])
         x = _stem(config, x.astype(jnp.float32) / 127.5 - 1.0)
+        stages = []
         for stage, blocks in enumerate(config.blocks):
             tail = len(config.blocks) - stage
             stride = 1 if stage == 0 else 2
@@ -64,12 +74,29 @@ class Encoder(nn.Module):
             for block in range(blocks):
                 width = config.width * 2**stage
                 x = ResidualBlock(width, stride if block == 0 else 1)(x)
+            stages.append(x)
         maps = nn.Conv(config.keypoints, (1, 1), name="keypoints")(x)
-        features = nn.Dense(config.features)(spatial_softmax(maps))
+        for coarser, finer in enumerate(stages[-config.scales : -1][::-1], 1):
+            name = f"keypoints_{coarser}"
+            finer = nn.Conv(config.keypoints, (1, 1), use_bias=False, name=name)(finer)
+            maps = finer + _enlarged(maps, finer.shape)
+        keypoints = spatial_softmax(maps)
+        features = nn.Dense(config.features)(keypoints)
         if config.average:
             average = nn.Dense(config.features)(x.mean((1, 2)))
             features = jnp.concatenate([features, average], axis=-1)
-        return features.reshape(*batch, -1)
+        return Encoding(
+            features.reshape(*batch, -1),
+            keypoints.reshape(*batch, config.keypoints, 2),
+        )
+
+
+def _enlarged(maps: jax.Array, shape: tuple[int, ...]) -> jax.Array:
+    """Maps of the next finer stage's `shape`, each cell repeated."""
+    for axis in (1, 2):
+        if maps.shape[axis] < shape[axis]:
+            maps = jnp.repeat(maps, 2, axis=axis)
+    return maps[:, : shape[1], : shape[2]]
 
 
 def spatial_softmax(maps: jax.Array) -> jax.Array:

@@ -1,0 +1,86 @@
+"""Where the hand's camera is, from the joints alone, and where a pixel's ray meets the table.
+
+A camera on the hand sees a resting object at another place of the image from every
+configuration. The joints are known, so the network need not learn the arm's kinematics to tell
+where on the table a keypoint lies.
+"""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jaxplan.config import HandCameraConfig
+
+PANDA_LINKS = (
+    (0.0, 0.333, 0.0),
+    (0.0, 0.0, -np.pi / 2),
+    (0.0, 0.316, np.pi / 2),
+    (0.0825, 0.0, np.pi / 2),
+    (-0.0825, 0.384, -np.pi / 2),
+    (0.0, 0.0, np.pi / 2),
+    (0.088, 0.0, np.pi / 2),
+)
+"""Craig's (a [m], d [m], alpha [rad]) of each joint, as the maker gives them."""
+FLANGE, HAND_TURN = 0.107, -np.pi / 4
+"""From the last joint to the hand's frame: along z [m], about z [rad]."""
+
+
+def camera_pose(config: HandCameraConfig, q: jax.Array) -> tuple[jax.Array, jax.Array]:
+    """Position [..., 3] [m] and axes (columns right, up, back) [..., 3, 3] at `q` [..., 7]."""
+    rotation = jnp.broadcast_to(jnp.eye(3), (*q.shape[:-1], 3, 3))
+    position = jnp.zeros((*q.shape[:-1], 3))
+    for joint, (a, d, alpha) in enumerate(PANDA_LINKS):
+        twist = _about_x(alpha)
+        position = position + rotation @ (jnp.array([a, 0.0, 0.0]) + d * twist[:, 2])
+        rotation = rotation @ twist @ _about_z(q[..., joint])
+    hand = rotation @ _about_z(jnp.array(HAND_TURN))
+    offset = jnp.array(config.position) + jnp.array([0.0, 0.0, FLANGE])
+    # The turn is about z, so the flange's offset may be taken in the hand's frame.
+    return position + hand @ offset, hand @ _mount(config.tilt)
+
+
+def on_plane(config: HandCameraConfig, image: jax.Array, q: jax.Array) -> jax.Array:
+    """Where rays through image points meet the plane `config.plane` above the table.
+
+    Args:
+        config: Mount and lens.
+        image: [..., K, 2], x to the right and y down, both in [-1, 1].
+        q: [..., 7] [rad].
+
+    Returns:
+        [..., K, 2], x and y in the world, about `config.centre` in units of `config.scale`,
+        inside [-3, 3]: a ray near the horizon ends there.
+    """
+    position, axes = camera_pose(config, q)
+    x, y = jnp.split(image, 2, axis=-1)
+    half = np.tan(np.radians(config.fovy) / 2)
+    rays = jnp.concatenate([x * half * config.aspect, -y * half, -jnp.ones_like(x)], -1)
+    rays = rays @ jnp.swapaxes(axes, -1, -2)
+    height = position[..., None, 2:] - config.plane
+    distance = height / jnp.maximum(-rays[..., 2:], 0.05)
+    points = position[..., None, :2] + distance * rays[..., :2]
+    return jnp.clip((points - jnp.array(config.centre)) / config.scale, -3.0, 3.0)
+
+
+def _mount(tilt: float) -> np.ndarray:
+    """The camera's axes in the hand's frame: it looks along z, turned by `tilt` about y."""
+    back = np.array([np.sin(tilt), 0.0, -np.cos(tilt)])
+    right = np.array([0.0, -1.0, 0.0])
+    return np.stack([right, np.cross(back, right), back], 1)
+
+
+def _about_x(angle: float) -> np.ndarray:
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]])
+
+
+def _about_z(angle: jax.Array) -> jax.Array:
+    """[...] to [..., 3, 3]."""
+    c, s, zero, one = (
+        jnp.cos(angle),
+        jnp.sin(angle),
+        jnp.zeros_like(angle),
+        jnp.ones_like(angle),
+    )
+    rows = [c, -s, zero, s, c, zero, zero, zero, one]
+    return jnp.stack(rows, -1).reshape(*angle.shape, 3, 3)

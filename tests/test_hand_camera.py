@@ -1,0 +1,64 @@
+"""The hand's camera by way of the joints, against MuJoCo's own."""
+
+import jax.numpy as jnp
+import mujoco
+import numpy as np
+import pytest
+
+from jaxplan.config import HandCameraConfig
+from jaxplan.networks.hand_camera import camera_pose, on_plane
+from jaxplan.tasks.mug import scene
+
+CONFIG = HandCameraConfig()
+
+
+@pytest.fixture(scope="module")
+def data() -> mujoco.MjData:
+    return mujoco.MjData(scene.build())
+
+
+def configurations() -> np.ndarray:
+    noise = np.random.default_rng(0).normal(0, 0.2, (6, 7))
+    return (scene.Q_HOME + noise).astype(np.float32)
+
+
+def look(data: mujoco.MjData, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    data.qpos[:7] = q
+    mujoco.mj_kinematics(data.model, data)
+    mujoco.mj_camlight(data.model, data)
+    camera = data.camera("hand")
+    return camera.xpos.copy(), camera.xmat.reshape(3, 3).copy()
+
+
+def test_the_mount_is_the_scene_s(data):
+    camera = data.model.camera("hand")
+    assert camera.fovy[0] == CONFIG.fovy
+    assert pytest.approx(CONFIG.aspect) == scene.IMAGE_WIDTH / scene.IMAGE_HEIGHT
+    q = configurations()
+    position, axes = camera_pose(CONFIG, jnp.asarray(q))
+    for row in range(len(q)):
+        expected = look(data, q[row])
+        np.testing.assert_allclose(position[row], expected[0], atol=1e-5)
+        np.testing.assert_allclose(axes[row], expected[1], atol=1e-5)
+
+
+def test_a_seen_point_is_found_again_on_the_plane(data):
+    """Project with MuJoCo's camera, and back by `on_plane`."""
+    points = np.array([[0.5, 0.05, CONFIG.plane], [0.42, -0.1, CONFIG.plane]])
+    for q in configurations():
+        eye, axes = look(data, q)
+        local = (points - eye) @ axes
+        image = local[:, :2] / -local[:, 2:] / np.tan(np.radians(CONFIG.fovy) / 2)
+        image *= [1 / CONFIG.aspect, -1]
+        found = on_plane(CONFIG, jnp.asarray(image, jnp.float32), jnp.asarray(q))
+        found = np.asarray(found) * CONFIG.scale + CONFIG.centre
+        np.testing.assert_allclose(found, points[:, :2], atol=1e-5)
+
+
+def test_a_ray_near_the_horizon_stays_finite():
+    q = jnp.zeros(
+        7
+    )  # the arm stretched out: the camera looks down; now level with the table
+    for wrist in (0.0, 1.5, 2.5):
+        found = on_plane(CONFIG, jnp.ones((1, 2)), q.at[5].set(wrist))
+        assert np.all(np.abs(found) <= 3.0)
