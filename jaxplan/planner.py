@@ -344,7 +344,12 @@ def _keys(seeds: jax.Array) -> jax.Array:
 
 
 def _parts(count: int) -> list[np.ndarray]:
-    """Rows of each thread: XLA on CPU keeps one core busy, and interleaving shares them fairly."""
+    """Rows of each thread: XLA on CPU keeps one core and a half busy with a search.
+
+    Two threads a core, because hard problems make some end much later than others;
+    interleaving shares these fairly.
+    """
     cores = os.cpu_count() or 1
-    threads = min(cores, count // 16) if jax.default_backend() == "cpu" else 1
-    return [np.arange(count)[i :: max(threads, 1)] for i in range(max(threads, 1))]
+    wanted = min(2 * cores, count // 16) if jax.default_backend() == "cpu" else 1
+    threads = max(wanted, 1)
+    return [np.arange(count)[i::threads] for i in range(threads)]
