@@ -2,6 +2,7 @@
 
 from functools import cache
 from types import SimpleNamespace
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -81,12 +82,12 @@ def shapes(model: mujoco.MjModel, name: str, poses: np.ndarray) -> Shapes:
         name: Of the geom and its body.
         poses: `[B, 3, 4]` of its body.
     """
-    scene = SimpleNamespace(model=model, mj_model=model)
+    scene: Any = SimpleNamespace(model=model, mj_model=model)
     own = read(scene, (model.geom(name).id,))
     fill = [(0, HULL - len(own.vertices[0]) if own.vertices else 0), (0, 0), (0, 0)]
     own = own._replace(vertices=[jnp.pad(x, fill, mode="edge") for x in own.vertices])
-    poses = jnp.asarray(np.moveaxis(poses, 0, -1)[None], jnp.float32)
-    return in_world(own, poses, np.zeros(1, int))
+    batch_last = jnp.asarray(np.moveaxis(poses, 0, -1)[None], jnp.float32)
+    return in_world(own, batch_last, np.zeros(1, int))
 
 
 @cache
