@@ -25,15 +25,20 @@ class Certification:
     def __init__(self, planner: MotionPlanner, scene: Scene | None = None) -> None:
         self._scene = planner.scene if scene is None else scene
         self.statuses: Counter[str] = Counter()
+        self.blocked = 0
+        """Problems whose straight line from start to goal is refused."""
         self.refused: list[str] = []
         self.invalid: list[str] = []
 
     def __call__(self, phase: Phase) -> None:
         """Certifies a round."""
         result = phase.motion.result
-        for e in phase.episodes:
+        for row, e in enumerate(phase.episodes):
             self.statuses[Status(result.status[e]).name] += 1
             world = jax.tree.map(lambda leaf, e=e: leaf[e], phase.worlds)
+            line = phase.observation.q[row], phase.targets.q_goal[row]
+            straight = certify(self._scene, world, np.array(line, float))
+            self.blocked += not straight.valid
             path = result.path[e, : result.path_length[e]]
             for waypoints, said in (
                 (path, self.refused),
@@ -58,6 +63,7 @@ class Certification:
             "problems": problems,
             "solved": self.statuses[Status.SOLVED.name],
             "statuses": dict(self.statuses),
+            "straight_lines_refused": self.blocked,
             "paths_refused": len(self.refused),
             "motions_invalid": len(self.invalid),
             "examples": (self.refused + self.invalid)[:20],

@@ -5,8 +5,7 @@ import importlib
 import os
 import sys
 import weakref
-from collections.abc import Iterable, Iterator, Sequence
-from typing import Literal, NamedTuple
+from collections.abc import Iterable
 
 import mujoco
 import numpy as np
@@ -37,17 +36,6 @@ def _use_headless_gl() -> None:
     raise NoGLError(ADVICE)
 
 
-class Mark(NamedTuple):
-    """A small sphere or cross drawn into a picture."""
-
-    position: np.ndarray
-    """(3,) [m]."""
-    radius: float
-    """[m]."""
-    rgba: tuple[float, float, float, float]
-    shape: Literal["sphere", "cross"] = "sphere"
-
-
 class Camera:
     """Renders images of one size.
 
@@ -68,6 +56,7 @@ class Camera:
         width: int,
         groups: Iterable[int] = (0, 1, 2),
     ) -> None:
+        self._height, self._width = height, width
         try:
             _use_headless_gl()
             self._renderer = mujoco.Renderer(model, height, width)
@@ -76,41 +65,39 @@ class Camera:
         except (mujoco.FatalError, AttributeError, ImportError, RuntimeError) as error:
             raise NoGLError(f"{ADVICE} ({error})") from error
         # Without this the interpreter takes down EGL before the renderer that needs it.
-        weakref.finalize(self, self._renderer.close)
+        weakref.finalize(self, _close, self._renderer)
         options = mujoco.MjvOption()
         options.geomgroup[:] = 0
         options.geomgroup[list(groups)] = 1
         self._options = options
 
     def render(
-        self,
-        data: mujoco.MjData,
-        camera: str | int | mujoco.MjvCamera,
-        marks: Sequence[Mark] = (),
+        self, data: mujoco.MjData, camera: str | int | mujoco.MjvCamera
     ) -> np.ndarray:
-        """Image (height, width, 3) uint8 from a camera, with marks drawn into the scene."""
+        """Image (height, width, 3) uint8 from a camera."""
         self._renderer.update_scene(data, camera, self._options)
-        scene = self._renderer.scene
-        for mark in marks:
-            for kind, size in _geoms(mark):
-                if scene.ngeom == scene.maxgeom:
-                    break
-                mujoco.mjv_initGeom(
-                    scene.geoms[scene.ngeom],
-                    type=kind,
-                    size=size,
-                    pos=np.asarray(mark.position, float),
-                    mat=np.eye(3).ravel(),
-                    rgba=np.asarray(mark.rgba, np.float32),
-                )
-                scene.ngeom += 1
         return self._renderer.render()
 
+    def project(self, points: np.ndarray) -> np.ndarray:
+        """Where points (N, 3) [m] are in the image that was last rendered, (N, 2) [px].
 
-def _geoms(mark: Mark) -> Iterator[tuple[mujoco.mjtGeom, np.ndarray]]:
-    """Type and size of the geoms that make a mark: one, or a cross's three bars."""
-    if mark.shape == "sphere":
-        yield mujoco.mjtGeom.mjGEOM_SPHERE, np.full(3, mark.radius)
-    else:
-        for axis in np.eye(3):
-            yield mujoco.mjtGeom.mjGEOM_BOX, mark.radius * np.where(axis, 1, 0.25)
+        Column and row, also of what lies behind something; points must be before the camera.
+        """
+        eyes = self._renderer.scene.camera
+        pos, forward, up = (
+            np.mean([getattr(eye, field) for eye in eyes], axis=0)
+            for field in ("pos", "forward", "up")
+        )
+        axes = np.stack([np.cross(forward, up), -up, forward])
+        x, y, z = axes @ (np.reshape(points, (-1, 3)) - pos).T
+        # frustum_top over frustum_near is the tangent of half the field of view
+        focal = self._height / 2 * eyes[0].frustum_near / eyes[0].frustum_top
+        centre = np.array([self._width, self._height]) / 2
+        return centre + focal * np.stack([x / z, y / z], 1)
+
+
+def _close(renderer: mujoco.Renderer) -> None:
+    """Frees a renderer's buffers in its own context, not in that of another camera."""
+    if context := renderer._gl_context:
+        context.make_current()
+    renderer.close()

@@ -4,24 +4,35 @@ from typing import NamedTuple
 
 import mujoco
 import numpy as np
-from PIL import Image
+from PIL import Image, ImageDraw
 
 from jaxplan.planning import Segment
-from jaxplan.simulation.camera import Camera, Mark
+from jaxplan.simulation.camera import Camera
 from jaxplan.tasks.mug import scene
 from jaxplan.tasks.mug.kinematics import InverseKinematics
 from jaxplan.tasks.mug.task import MugTask
 
 HEIGHT, WIDTH = 480, 640
-INSET = (204, 132)
-"""Size of what the hand's camera saw, in a picture's corner [px]."""
+INSET = 0.3
+"""Width of what the hand's camera saw, as a share of the picture's."""
 
-Rgba = tuple[float, float, float, float]
-PROPOSAL: Rgba = (0.10, 0.35, 1.0, 0.45)
-SUBGOAL: Rgba = (0.05, 0.10, 0.70, 1.0)
-CLOSES: Rgba = (0.10, 0.75, 0.20, 1.0)
-OPENS: Rgba = (0.90, 0.10, 0.80, 1.0)
+Color = tuple[int, int, int]
+PROPOSAL: Color = (40, 150, 255)
+SUBGOAL: Color = (10, 20, 140)
+CLOSES: Color = (0, 175, 50)
+OPENS: Color = (235, 20, 200)
+MARKS = PROPOSAL, SUBGOAL, CLOSES, OPENS
 """Of learned proposals, the subgoal, and toggles that close or open: the paper's Figure 2."""
+
+
+class Mark(NamedTuple):
+    """Something drawn over a picture, in sight even where it lies behind the hand."""
+
+    position: np.ndarray
+    """(3,) [m]."""
+    shape: str
+    """dot, disc or cross."""
+    color: Color
 
 
 class Moment(NamedTuple):
@@ -40,14 +51,16 @@ class Painter:
 
     Args:
         task: Whose scene it is.
-        view: Where the picture is taken from: `static` shows the robot, `near` the hand at work.
+        view: Where from: `static` shows the whole robot, `near` the hand at work.
+        scale: Of the picture's sides, 1 for `WIDTH` by `HEIGHT`, at most 2.
     """
 
-    def __init__(self, task: MugTask, view: str = "static") -> None:
+    def __init__(self, task: MugTask, view: str = "static", scale: int = 1) -> None:
         model = scene.build("physics", task.shape, task.variant)
         model.vis.quality.shadowsize, model.vis.quality.offsamples = 2048, 2
-        self._view = view if view == "static" else _near()
-        self._camera = Camera(model, HEIGHT, WIDTH)
+        self._view = _near() if view == "near" else view
+        self._scale = scale
+        self._camera = Camera(model, scale * HEIGHT, scale * WIDTH)
         self._model, self._data = model, mujoco.MjData(model)
         self._kinematics = InverseKinematics(model)
 
@@ -56,8 +69,8 @@ class Painter:
         row, targets = phase.episodes.index(episode), phase.targets
         toggle = CLOSES if targets.gripper_toggle[row] else OPENS
         marks = (
-            self._mark(targets.q_toggle[row], 0.012, toggle),
-            Mark(self.tcp(targets.q_goal[row]), 0.024, SUBGOAL, "cross"),
+            Mark(self.tcp(targets.q_toggle[row]), "disc", toggle),
+            Mark(self.tcp(targets.q_goal[row]), "cross", SUBGOAL),
         )
         return Moment(qpos.copy(), phase.observation.image[row], marks)
 
@@ -89,32 +102,57 @@ class Painter:
         nodes = result.path[episode, at, None] + direction * step
         return nodes.reshape(-1, 7).clip(*self._model.jnt_range[:7].T)
 
-    def dots(self, nodes: np.ndarray, radius: float = 0.004) -> tuple[Mark, ...]:
+    def dots(self, nodes: np.ndarray) -> tuple[Mark, ...]:
         """Where proposed nodes (N, 7) [rad] bring the tool centre point."""
-        return tuple(self._mark(q, radius, PROPOSAL) for q in nodes)
+        return tuple(Mark(self.tcp(q), "dot", PROPOSAL) for q in nodes)
 
     def picture(self, moment: Moment) -> Image.Image:
-        """Renders a moment, with what the hand's camera saw in its corner."""
+        """Renders a moment, with what the hand's camera saw in its lower right corner."""
         self._data.qpos[:] = moment.qpos
         mujoco.mj_forward(self._model, self._data)
+        picture = Image.fromarray(self._camera.render(self._data, self._view))
         marks = (*moment.proposals, *moment.targets)
-        picture = Image.fromarray(self._camera.render(self._data, self._view, marks))
+        if marks:
+            places = self._camera.project(np.array([m.position for m in marks]))
+            picture = _marked(picture, marks, places, self._scale)
         if moment.seen is not None:
-            seen = Image.fromarray(moment.seen).resize(INSET)
-            picture.paste(seen, (WIDTH - INSET[0], 0))
+            width = round(INSET * picture.width)
+            height = width * moment.seen.shape[0] // moment.seen.shape[1]
+            seen = Image.fromarray(moment.seen).resize((width, height))
+            picture.paste(seen, (picture.width - width, picture.height - height))
         return picture
 
     def tcp(self, q: np.ndarray) -> np.ndarray:
         """The tool centre point (3,) of joints (7,) [rad]."""
         return self._kinematics.pose(q)[0]
 
-    def _mark(self, q: np.ndarray, radius: float, rgba: Rgba) -> Mark:
-        return Mark(self.tcp(q), radius, rgba)
+
+def _marked(
+    picture: Image.Image, marks: tuple[Mark, ...], places: np.ndarray, scale: int
+) -> Image.Image:
+    """The picture with marks at pixels (N, 2); dots let through what is below."""
+    over = Image.new("RGBA", picture.size)
+    draw = ImageDraw.Draw(over)
+    for mark, (x, y) in zip(marks, places, strict=True):
+        if mark.shape == "dot":
+            r = 3 * scale
+            box = (x - r, y - r, x + r, y + r)
+            draw.ellipse(box, (*mark.color, 150), (0, 50, 140, 200))
+        elif mark.shape == "disc":
+            r = 7 * scale
+            box = (x - r, y - r, x + r, y + r)
+            draw.ellipse(box, (*mark.color, 230), (255, 255, 255, 255), 2 * scale)
+        else:
+            for color, r, width in (((255, 255, 255), 12, 6), (mark.color, 11, 3)):
+                r, width = r * scale, width * scale
+                draw.line((x - r, y, x + r, y), (*color, 255), width)
+                draw.line((x, y - r, x, y + r), (*color, 255), width)
+    return Image.alpha_composite(picture.convert("RGBA"), over).convert("RGB")
 
 
 def _near() -> mujoco.MjvCamera:
     """A view of the table's middle, the box and the hand above them."""
     view = mujoco.MjvCamera()
-    view.lookat[:] = 0.42, -0.08, 0.16
-    view.distance, view.azimuth, view.elevation = 1.05, 150.0, -30.0
+    view.lookat[:] = 0.42, -0.10, 0.23
+    view.distance, view.azimuth, view.elevation = 1.15, 125.0, -28.0
     return view

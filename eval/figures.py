@@ -1,0 +1,245 @@
+"""The paper's Figures 2 to 5: `python eval/figures.py --out runs/figures`.
+
+    figure2   the first two long phases: toggle, subgoal, and where learned proposals lead
+    figure3   one episode in ten panels
+    figure4   three initialisations, a column for each of the four toggles
+    figure5   the three learned samplers on the same problems, side by side
+
+Blue dots are where the nodes that the learned sampler proposes bring the tool centre point:
+its segments, begun at nodes along the path that the search found. Uniform proposals are left out.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from PIL import Image
+from sheet import Key, blank, sheet
+
+from jaxplan.agent import Agent
+from jaxplan.cli import run_script
+from jaxplan.evaluation import Study, Success, parse_seeds
+from jaxplan.learning import Weights, WeightsError, load_pair, load_weights
+from jaxplan.learning.pretrained import DIRECTORY
+from jaxplan.rollout import Phase
+from jaxplan.tasks.mug import painter
+from jaxplan.tasks.mug.painter import Moment, Painter
+
+SAMPLERS = {"Diffusion (ours)": "sampler", "CVAE": "cvae", "Conditional GAN": "gan"}
+TOGGLES = ("rim grasp", "release", "handle grasp", "placing")
+NEAR = 0.02
+"""A proposal that leads no farther than this from the way that was taken [m] is near it."""
+
+
+@dataclass(frozen=True)
+class Args:
+    """Runs some episodes and draws them."""
+
+    seeds: str = "100000:100008"
+    """Episodes to choose from: the first that succeed are drawn."""
+    out: Path = Path("runs/figures")
+    weights: Path = DIRECTORY
+    """Directory with predictor, samplers and manifest."""
+    figures: tuple[int, ...] = (2, 3, 4, 5)
+    quick: bool = False
+    """Two episodes."""
+    study: Success = Success()
+
+
+class Scene(NamedTuple):
+    """A phase of an episode, and what its picture needs."""
+
+    phase: Phase
+    episode: int
+    stage: int
+    """Toggles so far."""
+    moment: Moment
+    """With the proposals of the sampler that drove."""
+
+
+class Recorder:
+    """Listens to the loop and keeps every phase's picture."""
+
+    def __init__(self, study: Study, paint: Painter) -> None:
+        self._study, self._paint = study, paint
+        self.scenes: dict[int, list[Scene]] = {}
+
+    def __call__(self, phase: Phase) -> None:
+        """Keeps a round."""
+        segments = phase.segments
+        for row, e in enumerate(phase.episodes):
+            before = self.scenes.setdefault(e, [])
+            gripper = int(phase.observation.gripper[row])
+            stage = before[-1].stage if before else 0
+            stage += stage % 2 != gripper
+            qpos = self._study.task.sim.data[e].qpos
+            moment = self._paint.moment(phase, e, qpos)
+            if segments is not None:
+                nodes = self._paint.proposed(phase, e, segments, 6, 16)
+                moment = moment._replace(proposals=self._paint.dots(nodes))
+            before.append(Scene(phase, e, stage, moment))
+
+
+def main(args: Args) -> None:
+    """Runs the episodes, draws the figures, prints where they are."""
+    seeds = parse_seeds(args.seeds)
+    seeds = seeds[:2] if args.quick else seeds
+    weights = load_pair(args.weights)
+    study = Study(weights, replace(args.study, batch=len(seeds)))
+    paint = Painter(study.task, "near", scale=2)
+    recorder = Recorder(study, paint)
+    result = study.run(seeds, listen=recorder)
+    solved = [e for e, row in enumerate(result["episodes"]) if row["success"]]
+    if not solved:
+        raise ValueError(f"none of the episodes {args.seeds} succeeded: other --seeds?")
+    args.out.mkdir(parents=True, exist_ok=True)
+    episodes = [recorder.scenes[e] for e in solved]
+    end = Moment(study.task.sim.data[solved[0]].qpos.copy())
+    names = [str(seeds[e]) for e in solved]
+    for number in args.figures:
+        if number == 2:
+            page = figure2(paint, episodes[0])
+        elif number == 3:
+            page = figure3(paint, episodes[0], end)
+        elif number == 4:
+            page = figure4(paint, episodes[:3], names[:3])
+        elif number == 5:
+            page = figure5(paint, study, args.weights, weights[0], episodes[0])
+        else:
+            raise ValueError(f"figure {number}: 2, 3, 4 or 5")
+        path = args.out / f"figure{number}.png"
+        small(page).save(path, optimize=True)
+        print(f"written: {path} (seeds {', '.join(names[:3])})")
+
+
+def figure2(paint: Painter, scenes: Sequence[Scene]) -> Image.Image:
+    """Toward the rim grasp, and toward the release."""
+    chosen = [_longest(scenes, stage) for stage in (0, 1)]
+    captions = ["toward the rim grasp", "toward the release, mug in hand"]
+    panels = [paint.picture(scene.moment) for scene in chosen]
+    return sheet([panels], [captions], legend(), width=620)
+
+
+def figure3(paint: Painter, scenes: Sequence[Scene], end: Moment) -> Image.Image:
+    """Ten panels from the first grasp to the final placement."""
+    stages = [[s for s in scenes if s.stage == stage] for stage in range(4)]
+    rim, release, handle, placing = stages
+    chosen = [
+        (rim[0], "toward the first grasp"),
+        (rim[-1], "the subgoal is the toggle"),
+        (release[0], "grasped: lift"),
+        (release[len(release) // 2], "turn and carry to the release"),
+        (handle[0], "released upright: back off"),
+        (handle[min(1, len(handle) - 1)], "toward the handle"),
+        (handle[-1], "the subgoal is the toggle"),
+        (placing[0], "handle grasped: lift"),
+        (placing[len(placing) // 2], "toward the box"),
+    ]
+    panels = [paint.picture(scene.moment) for scene, _ in chosen] + [paint.picture(end)]
+    captions = [text for _, text in chosen] + ["in the box"]
+    rows = [panels[:5], panels[5:]]
+    return sheet(rows, [captions[:5], captions[5:]], legend(), width=360)
+
+
+def figure4(
+    paint: Painter, episodes: Sequence[Sequence[Scene]], seeds: Sequence[str]
+) -> Image.Image:
+    """Initialisations as rows, the long phase before each toggle as columns."""
+    rows = [
+        [paint.picture(_longest(scenes, stage).moment) for stage in range(4)]
+        for scenes in episodes
+    ]
+    captions = [[f"seed {seed}"] * 4 for seed in seeds]
+    headings = [f"toward {name}" for name in TOGGLES]
+    return sheet(rows, captions, legend(), headings, letters=False)
+
+
+def figure5(
+    paint: Painter,
+    study: Study,
+    directory: Path,
+    predictor: Weights,
+    scenes: Sequence[Scene],
+) -> Image.Image:
+    """The phases before the two grasps, proposed for by each sampler."""
+    chosen = [_longest(scenes, 0), _longest(scenes, 1), _longest(scenes, 2)]
+    rows: list[list[Image.Image]] = [[] for _ in chosen]
+    captions: list[list[str]] = [[] for _ in chosen]
+    for title, name in SAMPLERS.items():
+        try:
+            sampler = load_weights(name, directory)
+            agent = Agent(predictor, sampler, study.config.batch)
+        except WeightsError as error:
+            print(f"{title}: {error}")
+            for row, caption in zip(rows, captions, strict=True):
+                row.append(blank(f"no {name} weights"))
+                caption.append("not measured")
+            continue
+        for row, caption, scene in zip(rows, captions, chosen, strict=True):
+            nodes = _proposals(paint, agent, scene)
+            moment = scene.moment._replace(proposals=paint.dots(nodes), seen=None)
+            row.append(paint.picture(moment))
+            share = np.mean(_distance(paint, nodes, scene) < NEAR)
+            caption.append(
+                f"before the {TOGGLES[scene.stage]}: {share:.0%} within "
+                f"{100 * NEAR:.0f} cm of the way taken"
+            )
+    return sheet(rows, captions, legend(), list(SAMPLERS), width=480, letters=False)
+
+
+def legend() -> list[Key]:
+    """What the marks mean."""
+    entries = (
+        ("dot", painter.PROPOSAL, "learned proposals"),
+        ("cross", painter.SUBGOAL, "subgoal"),
+        ("dot", painter.CLOSES, "toggle: close"),
+        ("dot", painter.OPENS, "toggle: open"),
+    )
+    return [Key(shape, color, text) for shape, color, text in entries]
+
+
+def small(page: Image.Image) -> Image.Image:
+    """The page in 256 colours, those of the marks among them: a third of the size."""
+    marks = [c for color in painter.MARKS for c in color]
+    common = 256 - len(painter.MARKS)
+    palette = page.quantize(common).getpalette() or []
+    colors = Image.new("P", (1, 1))
+    colors.putpalette(palette[: 3 * common] + marks)
+    return page.quantize(palette=colors, dither=Image.Dither.NONE)
+
+
+def _longest(scenes: Sequence[Scene], stage: int) -> Scene:
+    """The phase of a stage with the longest way to its subgoal."""
+
+    def distance(scene: Scene) -> float:
+        phase, e = scene.phase, scene.episode
+        row = phase.episodes.index(e)
+        gap = phase.targets.q_goal[row] - phase.observation.q[row]
+        return float(np.linalg.norm(gap))
+
+    return max((s for s in scenes if s.stage == stage), key=distance)
+
+
+def _proposals(paint: Painter, agent: Agent, scene: Scene) -> np.ndarray:
+    """Nodes (N, 7) that a sampler proposes for a recorded phase."""
+    phase = scene.phase
+    agent.predict(phase.observation, phase.episodes)
+    keys = jax.vmap(jax.random.key)(jnp.arange(agent.batch))
+    draw = agent.propose(phase.observation, phase.targets, phase.episodes, keys)
+    segments = draw(jnp.zeros(agent.batch, jnp.int32))
+    return paint.proposed(phase, scene.episode, segments, bases=8, each=24)
+
+
+def _distance(paint: Painter, nodes: np.ndarray, scene: Scene) -> np.ndarray:
+    """(N,) from the tool centre points of nodes to those of the executed motion [m]."""
+    way = np.stack([paint.tcp(q) for q in scene.phase.motion.q[scene.episode][::2]])
+    ends = np.stack([paint.tcp(q) for q in nodes])
+    return np.linalg.norm(ends[:, None] - way, axis=-1).min(1)
+
+
+if __name__ == "__main__":
+    run_script(main, Args)
