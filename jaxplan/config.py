@@ -24,6 +24,9 @@ class PlannerConfig:
     p_uniform: float = 0.2
     """Probability that a proposal is a uniform segment and not a learned one, if there is a
     sampler."""
+    adaptive_uniform: bool = False
+    """The share of learned proposals, 1 - p_uniform, shrinks with the share of them that were
+    rejected so far in the search."""
     uniform_mode: Literal["toward", "independent"] = "toward"
     """`toward`: the uniform move goes from the nearest node toward q_rand (classical RRT).
     `independent`: its direction is drawn apart from q_rand, as the paper's UniformSegment."""
@@ -86,6 +89,8 @@ class RolloutConfig:
     """Phases in a row without a motion after which an episode has failed."""
     carry_speed: float = 0.6
     """Factor on velocities (squared: on accelerations) while the gripper is closed."""
+    regrasp: bool = False
+    """A gripper that has closed on nothing opens, backs off and looks again."""
 
 
 @dataclass(frozen=True)
@@ -192,11 +197,20 @@ class SegmentConfig:
     cond_features: int = 256
     relative: bool = False
     """Adds q_toggle - q_curr and q_goal - q_curr [rad] to the condition's input."""
+    tree_context: bool = False
+    """A segment comes with the node at which it is meant to begin, and a search takes from its
+    bank one that fits its base."""
     step_min: float = 0.05
     step_max: float = 0.2
     """s in [step_min, step_max] [rad]."""
     q_min: tuple[float, ...] = PANDA_Q_MIN
     q_max: tuple[float, ...] = PANDA_Q_MAX
+
+    @property
+    def size(self) -> int:
+        """Length of x_0: direction and step length, and with `tree_context` the base."""
+        joints = len(self.q_min)
+        return joints + 1 + self.tree_context * joints
 
 
 @dataclass(frozen=True)

@@ -74,6 +74,10 @@ class Task(Protocol):
         """Whether the joints lie in Q_term."""
         ...
 
+    def empty_handed(self, episode: int) -> bool:
+        """Whether the gripper has closed on nothing, as its fingers say."""
+        ...
+
     def retreat(self, episode: int) -> np.ndarray:
         """Joints of a hand that has backed off [rad]."""
         ...
@@ -133,6 +137,8 @@ class Phase(NamedTuple):
     """(B,) bool: the motion ends at a toggle."""
     leaving: list[int]
     """Episodes in the terminal region: they back off, and end."""
+    missed: list[int]
+    """Episodes whose gripper held nothing: it has opened, they back off, and look again."""
     worlds: World
     """What the search was told of each lane's world."""
     draw: Callable[[jax.Array], Segment] | None
@@ -225,6 +231,12 @@ class _Batch:
         self.failures[episode] = failure
         self.running.remove(episode)
 
+    def give_up_grasp(self, episodes: list[int]) -> None:
+        """Opens grippers that hold nothing; the next motion leaves what they are at."""
+        self.task.toggle(episodes, [False] * len(episodes))
+        self.since_toggle[episodes] = 0
+        self.touched[episodes] = True
+
     def judge(self) -> list[EpisodeRecord]:
         """The records of all episodes, once none is running."""
         finished = [e for e, failure in self.failures.items() if failure is None]
@@ -249,13 +261,15 @@ def _plan(
 ) -> Phase:
     """Observes, predicts and plans: lines 3 to 28 of Algorithm 1 for all running episodes."""
     task, running = batch.task, list(batch.running)
-    leaving = [e for e in running if task.in_terminal_region(e)]
+    missed = [e for e in running if config.regrasp and task.empty_handed(e)]
+    batch.give_up_grasp(missed)
+    leaving = [e for e in running if e not in missed and task.in_terminal_region(e)]
     observation = task.observe(running)
     targets = _merge(predict(observation, running), planner, config.merge_distance)
     for row, e in enumerate(running):
         if batch.since_toggle[e] >= config.stall_phases:
             targets.q_goal[row] = targets.q_toggle[row]
-    for e in leaving:
+    for e in leaving + missed:
         row = running.index(e)
         targets.q_goal[row] = targets.q_toggle[row] = task.retreat(e)
         targets.gripper_toggle[row] = task.closed[e]
@@ -286,6 +300,7 @@ def _plan(
         targets=targets,
         last=last,
         leaving=leaving,
+        missed=missed,
         worlds=worlds,
         draw=draw,
         motion=motion,

@@ -99,6 +99,35 @@ def test_toggling_on_the_spot_ends_with_a_reason(mug_task, mug_planner):
         assert [phase.toggled for phase in record.phases] == [True] * 3
 
 
+def test_a_gripper_that_closed_on_nothing_opens_and_backs_off(mug_task, mug_planner):
+    """And one that holds the mug does not: what tells them apart is how far the fingers met."""
+
+    def close(observation, episodes):
+        return Targets(observation.q, np.ones(len(episodes), int), observation.q)
+
+    config = RolloutConfig(max_phases=2, regrasp=True)
+    record = rollout(mug_task, [0], close, mug_planner, config=config)[0]
+    assert [phase.gripper_toggle for phase in record.phases] == [1, 0]
+    assert [phase.toggled for phase in record.phases] == [True, False]
+    assert not mug_task.closed[0]
+    high, low = (mug_task.sim.data[e].site("tcp").xpos[2] for e in (0, 1))
+    assert high - low > 0.09  # it looks down, so it backed off upwards
+
+    policy = ExpertPolicy(mug_task)
+    policy.reset(range(4))
+    records = rollout(
+        mug_task,
+        range(4),
+        lambda o, e: Targets(*policy(o, e)),
+        mug_planner,
+        config=RolloutConfig(regrasp=True),
+    )
+    assert all(record.success for record in records)
+    for record in records:
+        toggles = [phase.gripper_toggle for phase in record.phases if phase.toggled]
+        assert toggles == [1, 0, 1, 0]
+
+
 def test_a_mug_outside_the_range_is_a_failure(mug_task, mug_planner, monkeypatch):
     inside = poses.sample_pose
 

@@ -44,7 +44,9 @@ def describe(shard: Shard, settings: dict[str, Any]) -> dict[str, Any]:
             "direction of the opening [deg]": np.degrees(RANGE.yaw).round(1).tolist(),
             "side of the handle": ["left", "right"],
             "handle off its resting place [deg]": [0.0, float(np.degrees(RANGE.roll))],
-            "pitch [deg]": (np.degrees(RANGE.pitch) * [-1.0, 1.0]).round(1).tolist(),
+            "pitch [deg]": [
+                float(np.degrees(sign * RANGE.pitch)) for sign in (-1.0, 1.0)
+            ],
             "share of episodes driven beside their labels": noisy,
         },
         "episodes": len(success),

@@ -44,7 +44,7 @@ class ToggleErrors:
         """Keeps a round's predictions."""
         for row, e in enumerate(phase.episodes):
             dropped = self._task.closed[e] and not self._task.held(e)
-            if self._task.in_terminal_region(e) or dropped:
+            if e in phase.missed or self._task.in_terminal_region(e) or dropped:
                 continue
             q = phase.observation.q[row].astype(float)
             closed = bool(self._task.closed[e])

@@ -27,7 +27,8 @@ class Relabeler:
     def __call__(self, phase) -> None:
         """Keeps the frames of a round."""
         for row, e in enumerate(phase.episodes):
-            if e in phase.leaving or (self._task.closed[e] and not self._task.held(e)):
+            dropped = self._task.closed[e] and not self._task.held(e)
+            if e in phase.leaving + phase.missed or dropped:
                 continue
             q = phase.observation.q[row]
             keyframes, following = self._follow(e, q.astype(float))

@@ -17,6 +17,8 @@ from jaxplan.tasks.mug.mug import MugShape
 
 SETTLE = 0.8
 """Time to come to rest after the drop [s]."""
+MET = 0.001
+"""Fingers nearer than this to the middle hold nothing: half of the mug's wall is 2 mm [m]."""
 FINGERS, MUG = slice(7, 9), slice(9, 16)
 """Where qpos holds the fingers [m] and the mug's position and quaternion."""
 
@@ -58,6 +60,8 @@ class MugTask:
         model.geom_friction *= friction
         self.model, self.shape, self.batch = model, shape, batch
         self.variant: scene.Variant = variant
+        self.name = "mug" if variant == "plain" else f"mug_{variant}"
+        """As demonstrations and weights have it."""
         self.sim = Simulator(model, batch)
         self.closed = np.zeros(batch, bool)
         self._camera_name = camera
@@ -143,6 +147,10 @@ class MugTask:
     def held(self, episode: int) -> bool:
         """Whether the closed gripper has the mug between both pads."""
         return bool(self.closed[episode]) and self.pads_touching(episode) == 2
+
+    def empty_handed(self, episode: int) -> bool:
+        """Whether the closed gripper's fingers have met. Known from the fingers alone."""
+        return bool(self.closed[episode] and self.sim.fingers(episode).max() < MET)
 
     def follow(
         self, episodes: Sequence[int], trajectories: Sequence[np.ndarray]
