@@ -51,6 +51,9 @@ RIVAL = next(method for method in METHODS if "5 %" in method.name)
 class Args(StudyArgs):
     """Ablations on recorded problems."""
 
+    backbones: tuple[str, ...] = ("rrt",)
+    """Also: rrt_connect."""
+
 
 def main(args: Args) -> None:
     """Searches, prints tables, writes JSON."""
@@ -59,7 +62,10 @@ def main(args: Args) -> None:
     rows = np.flatnonzero(study.problems.blocked)
     if study.weights("sampler") is None:
         raise ValueError(f"no sampler in {study.directory}")
-    backbones = [each for each in BACKBONES if each.name != "literal"]
+    backbones = [each for each in BACKBONES if each.name in args.backbones]
+    if len(backbones) < len(args.backbones):
+        known = ", ".join(each.name for each in BACKBONES)
+        raise ValueError(f"backbones {args.backbones}: there are {known}")
     tables: list[Table] = []
     for backbone in tqdm(backbones, unit="backbone"):
         tables += list(study_backbone(study, backbone, rows))

@@ -6,6 +6,7 @@ network fixed"). The expert's problems depend on the seeds alone.
 """
 
 import dataclasses
+import hashlib
 import itertools
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -26,7 +27,7 @@ from jaxplan.networks import predict
 from jaxplan.rollout import Phase, Predict, Targets, rollout
 from jaxplan.scene.panda import PANDA_LIMITS
 from jaxplan.tasks.mug.demonstrate import ExpertPolicy
-from jaxplan.tasks.mug.scene import Variant
+from jaxplan.tasks.mug.scene import Variant, build
 from jaxplan.tasks.mug.task import MugTask
 
 SHARD = 32
@@ -56,7 +57,12 @@ def record(
     """
     upper = "expert" if predictor is None else predictor.info["sha256"]
     name = f"{variant}-{upper[:8]}"
-    settings = {"variant": variant, "upper": upper, "shard": SHARD}
+    settings = {
+        "variant": variant,
+        "scene": fingerprint(build("planning", variant=variant)),
+        "upper": upper,
+        "shard": SHARD,
+    }
     first, end = seeds.start // SHARD, -(-seeds.stop // SHARD)
     names = [f"problems_{index:06d}.npz" for index in range(first, end)]
     there = store.begin(directory / name, settings)
@@ -70,6 +76,15 @@ def record(
     found = store.read(directory / name, names)
     rows = (seeds.start <= found.seed) & (found.seed < seeds.stop)
     return found.take(np.flatnonzero(rows)), name
+
+
+def fingerprint(model) -> str:
+    """Of what a model (`mujoco.MjModel`) holds: other obstacles pose other problems."""
+    names = ("geom_type", "geom_size", "geom_pos", "geom_quat", "body_pos", "qpos0")
+    digest = hashlib.sha256()
+    for name in names:
+        digest.update(np.round(getattr(model, name), 6).astype(np.float32).tobytes())
+    return digest.hexdigest()[:16]
 
 
 class Recorder:
