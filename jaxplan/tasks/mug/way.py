@@ -31,7 +31,11 @@ ROOM = 0.01
 
 
 def expert_planner(task: MugTask) -> MotionPlanner:
-    """The planner of demonstrations in a task's scene."""
+    """The planner of demonstrations in a task's scene, and of recorded problems.
+
+    In clutter the paper's planner would not do for either: 500 uniform expansions are too few
+    for many phases, and the episodes that are left would be the easy ones.
+    """
     scene = task.planning_scene
     if task.variant == "cluttered":
         scene = thickened(scene, ROOM)
