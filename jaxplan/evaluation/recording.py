@@ -1,11 +1,10 @@
-"""Recording phase problems: the expert or the upper network predicts, a uniform planner drives.
+"""Recording phase problems: the expert or the upper network predicts, the expert's planner drives.
 
 No learned sampler has a part in it, so that none is favoured; whoever predicts is the same
 for all of them (section 5.5: "we replace only the lower planner while keeping the upper
 network fixed"). The expert's problems depend on the seeds alone.
 """
 
-import dataclasses
 import hashlib
 import itertools
 from collections.abc import Callable, Sequence
@@ -18,7 +17,7 @@ import numpy as np
 
 from jaxplan import collision
 from jaxplan.collision import World
-from jaxplan.config import PAPER_PLANNER, DemonstrationConfig, PlannerConfig
+from jaxplan.config import PAPER_PLANNER, DemonstrationConfig
 from jaxplan.evaluation import problems as store
 from jaxplan.evaluation.problems import Problems
 from jaxplan.learning import Weights
@@ -29,10 +28,10 @@ from jaxplan.scene.panda import PANDA_LIMITS
 from jaxplan.tasks.mug.demonstrate import ExpertPolicy
 from jaxplan.tasks.mug.scene import Variant, build
 from jaxplan.tasks.mug.task import MugTask
+from jaxplan.tasks.mug.way import expert_planner
 
 SHARD = 32
 """Episodes a shard, in lockstep."""
-UNIFORM = dataclasses.replace(PAPER_PLANNER, p_uniform=1.0)
 Upper = Literal["network", "expert"]
 
 
@@ -93,26 +92,26 @@ class Recorder:
     Args:
         variant: Of the scene.
         predictor: The upper network; None = the expert predicts.
-        planner: Who drives.
     """
 
     def __init__(
         self,
         variant: Variant,
         predictor: Weights | None,
-        planner: PlannerConfig = UNIFORM,
     ) -> None:
         self._task = MugTask(SHARD, variant=variant)
+        self._planner = expert_planner(self._task)
         scene = self._task.planning_scene
-        self._planner = MotionPlanner(scene, PANDA_LIMITS, planner)
+        # The expert's planner takes some obstacles for thicker than the problems have them.
+        self._judge = MotionPlanner(scene, PANDA_LIMITS)
         self._policy = ExpertPolicy(self._task, DemonstrationConfig(noisy_episodes=0))
         self._predict: Predict = self._expert
         if predictor is not None:
             self._predict = partial(_network, _upper(predictor))
-        points = collision.points_for(1.0, planner.edge_resolution)
+        points = collision.points_for(1.0, PAPER_PLANNER.edge_resolution)
         self._free = jit(
             lambda worlds, q0, q1: collision.motion_free(
-                scene, worlds, q0, q1, points, planner.margin
+                scene, worlds, q0, q1, points, PAPER_PLANNER.margin
             )
         )
         self._rows: list[tuple] = []
@@ -140,7 +139,7 @@ class Recorder:
         targets, observation = phase.targets, phase.observation
         q = np.zeros((2, SHARD, observation.q.shape[1]), np.float32)
         q[:, phase.episodes] = observation.q, targets.q_goal
-        start, goal = (self._planner.nearest_free(phase.worlds, ends) for ends in q)
+        start, goal = (self._judge.nearest_free(phase.worlds, ends) for ends in q)
         free = self._straight(phase.worlds, start, goal)
         worlds = jax.tree.map(np.asarray, phase.worlds)
         for row, e in enumerate(phase.episodes):
