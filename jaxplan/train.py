@@ -126,7 +126,7 @@ def parse(arguments: list[str]) -> Training:
 
 def train_predictor(config: PredictorTraining) -> Path:
     """Trains the upper network and exports it; returns the weights' path."""
-    shard, hashes = _read(config)
+    shard, origin = _read(config)
     held = learning.held_out(shard.seed, config.val_fraction)
     rows, val_rows = _split(np.arange(len(shard.q)), held)
     key = jax.random.key(config.seed)
@@ -142,7 +142,7 @@ def train_predictor(config: PredictorTraining) -> Path:
         gather,
         predictor.validation(config.network, shard, val_rows),
     )
-    return _export(config, "predictor", state.ema_params, hashes, metrics)
+    return _export(config, "predictor", state.ema_params, metrics, origin)
 
 
 def train_sampler(kind: str, config: SegmentTraining) -> Path:
@@ -151,7 +151,7 @@ def train_sampler(kind: str, config: SegmentTraining) -> Path:
     if config.network.encoder is None:
         upper = learning.load_weights("predictor", config.predictor)
     loss = _sampler_loss(kind, config, upper)
-    shard, hashes = _read(config)
+    shard, origin = _read(config)
     image = shard.image
     if upper is not None:
         logger.info("image features of %d frames, once", len(image))
@@ -170,8 +170,9 @@ def train_sampler(kind: str, config: SegmentTraining) -> Path:
         partial(sampler.gather, shard, image),
         sampler.validation(config, loss, shard, image, val_rows),
     )
-    extra = {"predictor_sha256": upper.info["sha256"]} if upper else {}
-    return _export(config, kind, state.ema_params, hashes, metrics, extra)
+    if upper is not None:
+        origin["predictor_sha256"] = upper.info["sha256"]
+    return _export(config, kind, state.ema_params, metrics, origin)
 
 
 def _sampler_loss(
@@ -180,11 +181,16 @@ def _sampler_loss(
     """The kind's loss; the few-step sampler's has its teacher in it.
 
     Raises:
-        UsageError: The teacher sees other conditions than the pupil.
+        UsageError: The teacher sees other conditions than the pupil, or says other things.
     """
     if not isinstance(config, FewStepTraining):
         return partial(LOSSES[kind], config)
     teacher = learning.load_weights("sampler", config.teacher)
+    if teacher.config.size != config.network.size:
+        raise UsageError(
+            f"the sampler in {config.teacher} has tree_context "
+            f"{teacher.config.tree_context}, the pupil {config.network.tree_context}"
+        )
     own = upper and upper.info["sha256"]
     if teacher.info.get("predictor_sha256") != own:
         raise UsageError(
@@ -193,14 +199,16 @@ def _sampler_loss(
     return partial(few_step.loss, config, teacher)
 
 
-def _read(config: TrainConfig) -> tuple[data.Shard, dict[str, str]]:
-    """All demonstrations, and each directory's manifest checksum."""
+def _read(config: TrainConfig) -> tuple[data.Shard, dict[str, Any]]:
+    """All demonstrations; their tasks, and each directory's manifest checksum."""
     shards = [data.read_demonstrations(directory) for directory in config.data]
     shard = shards[0] if len(shards) == 1 else data.concatenate(shards)
     logger.info("%d frames of %d episodes", len(shard.q), len(shard.episode_seed))
     # By name: where a machine keeps its data says nothing to anybody else.
     hashes = {Path(d).name: data.sha256(Path(d) / "manifest.json") for d in config.data}
-    return shard, hashes
+    settings = [data.read_manifest(d)["settings"] for d in config.data]
+    tasks = sorted({each["task"] for each in settings if "task" in each})
+    return shard, {"data": hashes, "tasks": tasks}
 
 
 def _split(rows: np.ndarray, held: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -235,16 +243,15 @@ def _export(
     config: Training,
     kind: str,
     params: dict,
-    hashes: dict[str, str],
     metrics: dict[str, float],
-    extra: dict | None = None,
+    origin: dict[str, Any],
 ) -> Path:
     directory = RUNS / config.name / "weights" if config.out is None else config.out
     training = dataclasses.asdict(dataclasses.replace(config, out=None))
     training.pop("network")  # `save_weights` records it
     for paths in ("data", "init", "predictor", "teacher"):
         training.pop(paths, None)  # the checksums say it without a machine's paths
-    info = {"data": hashes, "metrics": metrics, "training": training, **(extra or {})}
+    info = {"metrics": metrics, "training": training, **origin}
     return learning.save_weights(directory, kind, params, config.network, info)
 
 

@@ -96,14 +96,22 @@ def test_coding_is_inverted():
     s = jax.random.uniform(key_s, (4, 5), minval=0.05, maxval=0.2)
     x_0 = diffusion.encode(u, s, 0.05, 0.2)
     assert np.all(np.abs(x_0) <= diffusion.bounds(7))
-    direction, length = diffusion.decode(x_0, 0.05, 0.2)
+    direction, length = diffusion.decode(x_0, 7, 0.05, 0.2)
     np.testing.assert_allclose(direction, u, atol=1e-6)
     np.testing.assert_allclose(length, s, atol=1e-6)
 
 
+def test_a_base_is_coded_beside_the_arm():
+    q, base = jax.random.normal(jax.random.key(1), (2, 4, 7))
+    segment = jnp.zeros((4, 8))
+    x_0 = jnp.concatenate([segment, diffusion.encode_base(base, q)], axis=-1)
+    np.testing.assert_allclose(diffusion.decode_base(x_0, q), base, atol=1e-6)
+    assert diffusion.bounds(7, base=True).shape == x_0.shape[1:]
+
+
 def test_decode_is_always_a_segment():
     x_0 = jnp.array([[0.0] * 7 + [9.0], [3.0] * 7 + [-9.0]])
-    direction, length = diffusion.decode(x_0, 0.05, 0.2)
+    direction, length = diffusion.decode(x_0, 7, 0.05, 0.2)
     assert np.isfinite(direction).all()
     np.testing.assert_allclose(length, [0.2, 0.05], atol=1e-6)
 

@@ -238,6 +238,8 @@ ORACLE_CONFIGS = {
         toggle_tie_break=0.2,
         p_uniform=0.6,
     ),
+    "rrt, adaptive": settings_of(method="rrt", adaptive_uniform=True),
+    "rrt_connect, adaptive": settings_of(adaptive_uniform=True),
 }
 
 
@@ -270,6 +272,23 @@ def test_batched_search_is_the_sequential_one(config):
         np.testing.assert_array_equal(tree.parent[p, :size], oracle.parent)
         np.testing.assert_array_equal(tree.side[p, :size], oracle.side)
         np.testing.assert_allclose(tree.q[p, :size], oracle.q, atol=1e-5)
+
+
+def test_rejected_segments_make_the_sampler_rarer():
+    """Of segments that are never free, ever fewer are asked for; of free ones as many."""
+    worlds, q_start, _, keys = problems(16, seed=2)
+    shut = worlds._replace(radius=np.zeros_like(worlds.radius))
+    config = settings_of(method="rrt", max_expansions=100, goal_connect=0.0)
+    config = replace(config, goal_tolerance=0.0, goal_bias=0.0)
+    still = Segment(jnp.zeros((16, 8, 7)).at[..., 0].set(1e-3), jnp.full((16, 8), 0.1))
+    at_limit = np.array(q_start)
+    at_limit[:, 0] = Q_MAX  # where every such segment stands still, and is rejected
+    args = (shut, at_limit, at_limit - 1, at_limit, keys, lambda chunk: still)
+    fixed, adaptive = (
+        planner(replace(config, adaptive_uniform=on))(*args) for on in (False, True)
+    )
+    assert np.all(adaptive.learned < 0.5 * fixed.learned)
+    assert np.all(adaptive.learned > 0)
 
 
 @pytest.fixture(scope="module", params=METHODS)

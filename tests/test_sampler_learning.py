@@ -114,6 +114,7 @@ def test_the_door_trains_every_sampler(kind, trained):
     assert lower.config == DEBUG[kind].network
     assert lower.info["predictor_sha256"] == upper.info["sha256"]
     assert {"precision_median", "coverage_median"} <= set(lower.info["metrics"])
+    lower.check_task("a test's")
 
 
 @pytest.mark.parametrize("kind", SAMPLERS)
@@ -144,15 +145,22 @@ def test_a_killed_training_ends_with_the_same_bits(
 
 def test_weights_of_another_network_are_refused(trained, tmp_path):
     """By name and shape, also where the checksum is right."""
-    info = learning.load_weights("cvae", trained).info
     params = learning.load_weights("cvae", trained).params
     small = dataclasses.replace(DEBUG["cvae"].network, latent=2)
-    learning.save_weights(tmp_path, "cvae", params, small, {**info})
+    learning.save_weights(tmp_path, "cvae", params, small, {})
     with pytest.raises(
         learning.WeightsError,
         match=r"another network: .*decoder/Dense_0/kernel is \(3, 32\), .* \(2, 32\)",
     ):
         learning.load_weights("cvae", tmp_path)
+
+
+def test_weights_of_another_task_are_refused():
+    network = learning.Weights(None, {}, {"file": "gan.npz", "tasks": ["mug"]})
+    network.check_task("mug")
+    with pytest.raises(learning.WeightsError, match=r"gan.npz .* mug, not mug_cl"):
+        network.check_task("mug_cluttered")
+    network._replace(info={}).check_task("mug_cluttered")  # older ones do not say
 
 
 def test_a_pupil_needs_its_teachers_predictor(trained, demos, tmp_path, capsys):

@@ -1,5 +1,7 @@
 """Drawing segments: units, independence from the rest of the batch, closed forms."""
 
+from dataclasses import replace
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -19,6 +21,11 @@ CONFIGS = [
     CvaeConfig(hidden=(16, 16), encoder=None, relative=True),
     GanConfig(generator=(16, 16), discriminator=(8,), encoder=None),
 ]
+WITH_BASE = [replace(config, tree_context=True) for config in CONFIGS[1:]]
+
+
+def name_of(config) -> str:
+    return type(config).__name__ + "_with_base" * config.tree_context
 
 
 def condition(batch: int) -> Cond:
@@ -36,7 +43,7 @@ def weights(config, training: bool = False) -> dict:
     return jax.tree.map(lambda p: p + 0.01, params)
 
 
-@pytest.mark.parametrize("config", CONFIGS, ids=lambda c: type(c).__name__)
+@pytest.mark.parametrize("config", CONFIGS + WITH_BASE, ids=name_of)
 def test_segments_are_segments(config):
     keys = jax.random.split(jax.random.key(2), 3)
     segment = draw(config, weights(config), condition(3), keys, 5)
@@ -45,9 +52,15 @@ def test_segments_are_segments(config):
     assert np.all(segment.length >= 0.05 - 1e-6)
     assert np.all(segment.length <= 0.2 + 1e-6)
     assert np.ptp(segment.direction, axis=1).max() > 1e-3, "one and the same segment"
+    if config.tree_context:
+        assert segment.base.shape == (3, 5, 7)
+        gap = np.abs(segment.base - condition(3).q[:, None])
+        assert 1e-4 < gap.max() <= 3.0 + 1e-5, "bases are told relative to q_curr"
+    else:
+        assert segment.base is None
 
 
-@pytest.mark.parametrize("config", CONFIGS[1:], ids=lambda c: type(c).__name__)
+@pytest.mark.parametrize("config", CONFIGS[1:], ids=name_of)
 def test_a_problem_does_not_see_its_neighbours(config):
     params, cond = weights(config), condition(4)
     keys = jax.random.split(jax.random.key(2), 4)
@@ -58,7 +71,7 @@ def test_a_problem_does_not_see_its_neighbours(config):
     np.testing.assert_allclose(part.length, whole.length[rows], atol=1e-4)
 
 
-@pytest.mark.parametrize("config", CONFIGS[3:], ids=lambda c: type(c).__name__)
+@pytest.mark.parametrize("config", CONFIGS[3:], ids=name_of)
 def test_drawing_needs_no_weights_of_training(config):
     keys = jax.random.split(jax.random.key(2), 3)
     whole, part = weights(config, training=True)["params"], weights(config)["params"]

@@ -2,7 +2,9 @@
 
 from jaxplan.diffusion.coding import bounds as bounds
 from jaxplan.diffusion.coding import decode as decode
+from jaxplan.diffusion.coding import decode_base as decode_base
 from jaxplan.diffusion.coding import encode as encode
+from jaxplan.diffusion.coding import encode_base as encode_base
 from jaxplan.diffusion.ddim import ddim as ddim
 from jaxplan.diffusion.ddim import ddim_path as ddim_path
 from jaxplan.diffusion.ddim import timesteps as timesteps

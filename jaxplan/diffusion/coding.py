@@ -9,6 +9,10 @@ import jax.numpy as jnp
 
 CLIP = 1.02
 """Bound on |x_0|, as a factor of the largest value a segment can take."""
+SPREAD = 0.5
+"""Typical distance of a base from q_curr in a joint [rad]."""
+FARTHEST = 6.0
+"""Bound on the base in x_0, hence 3 rad in a joint."""
 
 
 def encode(
@@ -21,16 +25,27 @@ def encode(
 
 
 def decode(
-    x_0: jax.Array, step_min: float, step_max: float
+    x_0: jax.Array, joints: int, step_min: float, step_max: float
 ) -> tuple[jax.Array, jax.Array]:
-    """Unit direction [..., d] and length [...] in [step_min, step_max] [rad]."""
+    """Unit direction [..., joints] and length [...] in [step_min, step_max] [rad]."""
     centre, half = 0.5 * (step_min + step_max), 0.5 * (step_max - step_min)
-    u = x_0[..., :-1]
+    u, s = x_0[..., :joints], x_0[..., joints]
     direction = u / jnp.maximum(jnp.linalg.norm(u, axis=-1, keepdims=True), 1e-6)
-    length = jnp.clip(centre + half * x_0[..., -1], step_min, step_max)
+    length = jnp.clip(centre + half * s, step_min, step_max)
     return direction, length
 
 
-def bounds(joints: int) -> jax.Array:
-    """Largest |x_0| of a segment, times `CLIP`, [joints + 1]."""
-    return CLIP * jnp.append(jnp.full(joints, jnp.sqrt(float(joints))), 1.0)
+def encode_base(base: jax.Array, q: jax.Array) -> jax.Array:
+    """What x_0 has of a base [..., d], beside q_curr [..., d] [rad]; `[..., d]`."""
+    return (base - q) / SPREAD
+
+
+def decode_base(x_0: jax.Array, q: jax.Array) -> jax.Array:
+    """The base [..., d] [rad] in x_0 [..., 2 d + 1], beside q_curr [..., d] [rad]."""
+    return q + SPREAD * x_0[..., q.shape[-1] + 1 :]
+
+
+def bounds(joints: int, base: bool = False) -> jax.Array:
+    """Largest |x_0| of a segment, times `CLIP`, [joints + 1], or with its base [2 joints + 1]."""
+    segment = CLIP * jnp.append(jnp.full(joints, jnp.sqrt(float(joints))), 1.0)
+    return jnp.append(segment, jnp.full(joints, FARTHEST)) if base else segment

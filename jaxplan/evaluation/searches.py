@@ -76,7 +76,8 @@ class Banks:
     ) -> None:
         config = dataclasses.replace(sampler.config, **changes)
         self._cond, self._keys = cond, keys
-        self._chunks: dict[int, tuple[np.ndarray, np.ndarray, np.ndarray]] = {}
+        self._tree_context = config.tree_context
+        self._chunks: dict[int, tuple[np.ndarray, Any]] = {}
 
         @jit
         def draw(cond, keys, chunk):
@@ -90,26 +91,26 @@ class Banks:
 
         def draw(chunk: jax.Array) -> Segment:
             chunks = np.maximum(np.asarray(chunk), 0)
-            direction = np.zeros((len(rows), BANK, self._cond.q.shape[1]), np.float32)
-            length = np.zeros((len(rows), BANK), np.float32)
+            bank = self._empty(len(rows))
             for number in np.unique(chunks):
                 where = np.flatnonzero(chunks == number)
-                found = self._get(int(number), rows[where])
-                direction[where], length[where] = found
-            return Segment(jnp.asarray(direction), jnp.asarray(length))
+                _put(bank, where, self._get(int(number), rows[where]))
+            return jax.tree.map(jnp.asarray, bank)
 
         return draw
 
-    def _get(self, chunk: int, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def _empty(self, count: int) -> Any:
+        """Room for a bank of `count` problems, a Segment of NumPy arrays."""
+        shape = count, BANK, self._cond.q.shape[1]
+        zeros: list[Any] = [np.zeros(n, np.float32) for n in (shape, shape[:2], shape)]
+        return Segment(*zeros[: 3 if self._tree_context else 2])
+
+    def _get(self, chunk: int, rows: np.ndarray) -> Any:
         """The segments of a chunk; those that nobody asked for yet are drawn."""
         if chunk not in self._chunks:
-            count, joints = self._cond.q.shape
-            self._chunks[chunk] = (
-                np.zeros(count, bool),
-                np.zeros((count, BANK, joints), np.float32),
-                np.zeros((count, BANK), np.float32),
-            )
-        there, direction, length = self._chunks[chunk]
+            count = len(self._cond.q)
+            self._chunks[chunk] = np.zeros(count, bool), self._empty(count)
+        there, bank = self._chunks[chunk]
         missing = np.unique(rows[~there[rows]])
         for first in range(0, len(missing), BLOCK):
             part = missing[first : first + BLOCK]
@@ -119,10 +120,15 @@ class Banks:
                 lambda leaf, at=block: jnp.asarray(leaf[at]), self._cond
             )
             drawn = self._draw(cond, self._keys[block], jnp.int32(chunk))
-            direction[part] = np.asarray(drawn.direction)[: len(part)]
-            length[part] = np.asarray(drawn.length)[: len(part)]
+            _put(bank, part, drawn)
             there[part] = True
-        return direction[rows], length[rows]
+        return jax.tree.map(lambda leaf: leaf[rows], bank)
+
+
+def _put(bank: Any, rows: np.ndarray, drawn: Any) -> None:
+    """Writes into the bank's NumPy arrays; what was drawn beyond the rows is padding."""
+    for into, leaf in zip(jax.tree.leaves(bank), jax.tree.leaves(drawn), strict=True):
+        into[rows] = np.asarray(leaf)[: len(rows)]
 
 
 class Searcher:

@@ -56,6 +56,8 @@ class Study:
         self.task = MugTask(
             config.batch, config.camera, config.friction, variant=config.variant
         )
+        for network in weights:
+            network.check_task(self.task.name)
         self.planner = MotionPlanner(
             self.task.planning_scene, PANDA_LIMITS, config.planner, config.trajectory
         )

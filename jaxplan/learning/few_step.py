@@ -29,16 +29,15 @@ def loss(
     """Mean squared error of x_0 over the steps `config.learned_steps`."""
     key_targets, key_noise = jax.random.split(key)
     cond = perturb_targets(key_targets, batch.cond, config.target_noise)
-    joints = len(config.network.q_min)
-    total = config.network.num_train_timesteps
-    x_T = jax.random.normal(key_noise, (len(cond.q), 1, joints + 1))
+    joints, total = len(config.network.q_min), config.network.num_train_timesteps
+    x_T = jax.random.normal(key_noise, (len(cond.q), 1, config.network.size))
     steps = diffusion.timesteps(total, teacher.config.num_inference_steps)
     path, x_0 = diffusion.ddim_path(
         denoiser(teacher.config, teacher.params, cond, steps),
         x_T,
         total,
         steps,
-        clip=diffusion.bounds(joints),
+        clip=diffusion.bounds(joints, config.network.tree_context),
     )
     learned = np.array(config.learned_steps, np.int32)
     x_t = path[np.searchsorted(-steps, -learned), :, 0]

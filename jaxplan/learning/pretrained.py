@@ -52,6 +52,18 @@ class Weights(NamedTuple):
     info: dict
     """The manifest's entry."""
 
+    def check_task(self, task: str) -> None:
+        """Refuses weights that were trained on demonstrations of other tasks only.
+
+        Raises:
+            WeightsError: Naming both.
+        """
+        tasks = self.info.get("tasks") or [task]
+        if task not in tasks:
+            raise WeightsError(
+                f"{self.info.get('file')} was trained for {', '.join(tasks)}, not {task}"
+            )
+
 
 def save_weights(
     directory: str | os.PathLike, name: str, params: dict, config: Any, info: dict

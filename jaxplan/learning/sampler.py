@@ -14,6 +14,7 @@ from jaxplan.learning.loop import Metrics
 from jaxplan.learning.segments import PathRows, path_rows, training_segments
 from jaxplan.learning.train_state import Loss, Params
 from jaxplan.networks import Cond
+from jaxplan.planning.segment import Segment
 
 
 class Phases(NamedTuple):
@@ -34,14 +35,17 @@ def gather(shard: Shard, image: np.ndarray, rows: np.ndarray) -> Phases:
 def examples(
     config: SegmentTraining, key: jax.Array, batch: Phases
 ) -> tuple[Cond, jax.Array]:
-    """Conditions with noise on their targets, and a fresh true x_0 [B, 8] for each."""
+    """Conditions with noise on their targets, and a fresh true x_0 [B, size] for each."""
     key_targets, key_segments = jax.random.split(key)
     network = config.network
     cond = perturb_targets(key_targets, batch.cond, config.target_noise)
-    _, segment = training_segments(
-        key_segments, batch.paths, network.step_min, network.step_max
-    )
-    return cond, diffusion.encode(*segment, network.step_min, network.step_max)
+    steps = network.step_min, network.step_max
+    base, segment = training_segments(key_segments, batch.paths, *steps)
+    x_0 = diffusion.encode(segment.direction, segment.length, *steps)
+    if network.tree_context:
+        parts = x_0, diffusion.encode_base(base, batch.cond.q)
+        x_0 = jnp.concatenate(parts, axis=-1)
+    return cond, x_0
 
 
 def perturb_targets(key: jax.Array, cond: Cond, scale: float) -> Cond:
@@ -70,6 +74,7 @@ def validation(
 
     Precision: angle of a drawn direction to the nearest true one of its phase.
     Coverage: angle of a true direction to the nearest drawn one.
+    With `tree_context` also how well bases lie on the path, and directions along it.
     """
     network, n = config.network, config.val_segments
     key = jax.random.key(20_251_130)
@@ -99,9 +104,27 @@ def validation(
             "coverage_p90": jnp.quantile(coverage, 0.9),
             "length_mean": drawn.length.mean(),
             "length_mean_true": true.length.mean(),
+            **_beside_path(drawn, batch.paths),
         }
 
     def validate(params: Params) -> Metrics:
         return {name: float(value) for name, value in run(params, batch, many).items()}
 
     return validate
+
+
+def _beside_path(drawn: Segment, paths: PathRows) -> dict[str, jax.Array]:
+    """How far bases are from the path [rad], and directions from it there [deg]."""
+    if drawn.base is None:
+        return {}
+    gaps = jnp.linalg.norm(drawn.base[:, :, None] - paths.q[:, None], axis=-1)
+    at = jnp.minimum(jnp.argmin(gaps, axis=-1), paths.q.shape[1] - 2)
+    here, next_ = (
+        jnp.take_along_axis(paths.q, (at + i)[..., None], axis=1) for i in (0, 1)
+    )
+    tangent = (next_ - here) / jnp.linalg.norm(next_ - here, axis=-1, keepdims=True)
+    cosine = jnp.clip(jnp.sum(tangent * drawn.direction, axis=-1), -1.0, 1.0)
+    return {
+        "base_distance_median": jnp.median(gaps.min(axis=-1)),
+        "base_angle_median": jnp.median(jnp.degrees(jnp.arccos(cosine))),
+    }

@@ -45,7 +45,9 @@ class Condition(nn.Module):
     def __call__(self, cond: Cond) -> jax.Array:
         """`[..., cond_features]`."""
         config = self.config
-        image = cond.image if self.encoder is None else self.encoder(cond.image).features
+        image = (
+            cond.image if self.encoder is None else self.encoder(cond.image).features
+        )
         limits = config.q_min, config.q_max
         targets = [
             state_vector(cond.q_toggle, cond.gripper_toggle, *limits),

@@ -18,7 +18,7 @@ class CvaeNetwork(nn.Module):
         config = self.config
         self.condition = Condition(config)
         self.recognition = ConditionedMlp(config.hidden, 2 * config.latent, nn.relu)
-        self.decoder = ConditionedMlp(config.hidden, len(config.q_min) + 1, nn.relu)
+        self.decoder = ConditionedMlp(config.hidden, config.size, nn.relu)
 
     def cond(self, cond: Cond) -> jax.Array:
         """The vector of a condition, [..., cond_features]."""

@@ -47,18 +47,17 @@ class Generator(nn.Module):
     def setup(self) -> None:
         config = self.config
         self.condition = Condition(config)
-        outputs = len(config.q_min) + 1
-        self.mlp = ConditionedMlp(config.generator, outputs, nn.leaky_relu)
+        self.mlp = ConditionedMlp(config.generator, config.size, nn.leaky_relu)
 
     def cond(self, cond: Cond) -> jax.Array:
         return self.condition(cond)
 
     def __call__(self, z: jax.Array, cond: jax.Array) -> jax.Array:
-        out = self.mlp(z, cond)
-        u, s = out[..., :-1], jnp.tanh(out[..., -1:])
+        out, joints = self.mlp(z, cond), len(self.config.q_min)
+        u, s, base = jnp.split(out, [joints, joints + 1], axis=-1)
         square = jnp.sum(u * u, axis=-1, keepdims=True)
-        u = u * jnp.sqrt(u.shape[-1] / (square + 1e-6))
-        return jnp.concatenate([u, s], axis=-1)
+        u = u * jnp.sqrt(joints / (square + 1e-6))
+        return jnp.concatenate([u, jnp.tanh(s), base], axis=-1)
 
 
 class Discriminator(nn.Module):

@@ -40,7 +40,7 @@ def init(
     if isinstance(config, PredictorConfig):
         return model.init(key, pixels, joints, mode)
     cond = Cond(pixels, joints, mode, joints, mode, joints)
-    x_0 = jnp.zeros((1, len(config.q_min) + 1))
+    x_0 = jnp.zeros((1, config.size))
     if isinstance(config, CvaeConfig | GanConfig):
         z = jnp.zeros((1, config.latent))
         if not training:

@@ -22,13 +22,14 @@ class SamplerNetwork(nn.Module):
 
     def setup(self) -> None:
         config = self.config
-        outputs = len(config.q_min) + 1
         self.condition = Condition(config)
         self.step = mlp(4 * config.step_features, config.step_features)
         if config.denoiser == "unet1d":
+            if config.size % 2 ** (len(config.hidden) - 1):
+                raise ValueError(f"a U-Net of {config.size} numbers: see film_mlp")
             self.denoiser = ConditionalUnet1D(config.hidden)
         else:
-            self.denoiser = FilmMlp(config.hidden, outputs)
+            self.denoiser = FilmMlp(config.hidden, config.size)
         self.modulation = nn.Dense(sum(self.denoiser.film_sizes))
 
     def cond(self, cond: Cond) -> jax.Array:

@@ -25,6 +25,8 @@ class Draw(NamedTuple):
     """`[P, K, d]` uniform within the limits [rad]."""
     segment: Segment
     """UniformSegment: direction uniform on the sphere, length in [step_min, step_max]."""
+    coin: jax.Array
+    """`[P, K]` uniform in (0, 1), behind `learned`."""
 
 
 def draw_numbers(
@@ -51,7 +53,26 @@ def draw_numbers(
         segment=Segment(
             normal / jnp.linalg.norm(normal, axis=-1, keepdims=True), length
         ),
+        coin=uniform[..., 0],
     )
+
+
+def adapted(
+    draw: Draw, tried: jax.Array, kept: jax.Array, config: PlannerConfig
+) -> Draw:
+    """The draw under `adaptive_uniform`: rejected proposals make the sampler rarer.
+
+    The share of learned proposals is `(1 - p_uniform) (kept + 1) / (tried + 1)`: at first
+    that of the fixed mixture and never more, so uniform proposals keep their part.
+
+    Args:
+        draw: The random numbers.
+        tried: `[P]` learned proposals so far.
+        kept: `[P]` those of them whose motion was free.
+        config: Planner settings.
+    """
+    share = (1.0 - config.p_uniform) * (kept + 1) / (tried + 1)
+    return draw._replace(learned=draw.coin >= 1.0 - share[:, None])
 
 
 def mixture(

@@ -36,6 +36,12 @@ def asks(control: Control, draw: Draw, config: PlannerConfig) -> jax.Array:
     return ~control.connecting & draw.learned
 
 
+def towards(control: Control, query: Query) -> jax.Array:
+    """`[P, K, d]` the target whose nearest node is the base of a learned segment."""
+    q_goal = query.q_goal[:, None]
+    return jnp.broadcast_to(q_goal, (*control.side.shape, q_goal.shape[-1]))
+
+
 def propose(
     control: Control,
     tree: Tree,

@@ -42,6 +42,12 @@ def asks(control: Control, draw: Draw, config: PlannerConfig) -> jax.Array:
     return ~control.connecting & draw.learned & learns
 
 
+def towards(control: Control, query: Query) -> jax.Array:
+    """`[P, K, d]` the target whose nearest node is the base of a learned segment."""
+    forward = (control.side == START)[..., None]
+    return jnp.where(forward, query.q_goal[:, None], query.q_start[:, None])
+
+
 def propose(
     control: Control,
     tree: Tree,
@@ -53,10 +59,9 @@ def propose(
 ) -> Move:
     """A proposal of the mixture, mirrored in the goal's tree, or the next straight step."""
     forward = (control.side == START)[..., None]
-    towards = jnp.where(forward, query.q_goal[:, None], query.q_start[:, None])
     direction = jnp.where(forward, segment.direction, -segment.direction)
     segment = Segment(direction, segment.length)
-    proposal, learned = mixture(draw, asking, segment, towards, config)
+    proposal, learned = mixture(draw, asking, segment, towards(control, query), config)
     q_aim = configurations(tree, control.aim)
     move = straightened(proposal, control.connecting, q_aim, config.step_max)
     return Move(move, learned)

@@ -23,7 +23,7 @@ import jax.numpy as jnp
 from jaxplan.config import PlannerConfig
 from jaxplan.planning import bounded, rrt, rrt_connect
 from jaxplan.planning.edges import ConfigFree, motions_free, points_for
-from jaxplan.planning.proposal import draw_numbers
+from jaxplan.planning.proposal import adapted, draw_numbers
 from jaxplan.planning.result import PlanResult, Status
 from jaxplan.planning.segment import Limits, Segment, extend
 from jaxplan.planning.state import Move, Outcome, Query, State
@@ -38,6 +38,7 @@ from jaxplan.planning.tree import (
     nearest,
     plant,
 )
+from jaxplan.planning.tree_context import fitting
 
 T = TypeVar("T")
 METHODS = {"rrt": rrt, "rrt_connect": rrt_connect, "ao_rrt_connect": rrt_connect}
@@ -83,6 +84,8 @@ def empty(problems: int, joints: int, keys: jax.Array, config: PlannerConfig) ->
         waiting=jnp.zeros_like(zero, bool),
         chunk=zero,
         used=zero,
+        tried=zero,
+        kept=zero,
         expansions=zero,
         accepted=zero,
         checks=zero,
@@ -151,6 +154,8 @@ def advance(
     worker = jnp.arange(config.workers, dtype=jnp.int32)
     number = state.expansions[:, None] + worker
     draw = draw_numbers(query.key, number, limits, config)
+    if config.adaptive_uniform:
+        draw = adapted(draw, state.tried, state.kept, config)
     most = None
     if optimises(config):
         draw, most = bounded.informed(draw, query, control.side, limits)
@@ -167,6 +172,12 @@ def advance(
         waiting = able & jnp.any(asking & (row >= rows), axis=1)
         running, asking = (x & ~waiting[:, None] for x in (running, asking))
         row = jnp.clip(row, 0, rows - 1)
+        if bank.base is not None:
+            target = method.towards(control, query)
+            node, _ = nearest(state.tree, control.side, target, config.metric)
+            anchor = configurations(state.tree, node)
+            backward = control.side != 0
+            row = fitting(bank, anchor, backward, query.key, number)
         segment = Segment(at(bank.direction, row), at(bank.length, row))
 
     move = method.propose(control, state.tree, draw, asking, segment, query, config)
@@ -200,6 +211,8 @@ def advance(
         waiting=state.waiting | waiting,
         chunk=chunk,
         used=used,
+        tried=state.tried + jnp.sum(running & move.learned, axis=1, dtype=jnp.int32),
+        kept=state.kept + jnp.sum(free & move.learned, axis=1, dtype=jnp.int32),
         expansions=state.expansions + jnp.sum(running, axis=1, dtype=jnp.int32),
         accepted=state.accepted + jnp.sum(free, axis=1, dtype=jnp.int32),
         checks=state.checks + checks,

@@ -30,6 +30,8 @@ class Segment(NamedTuple):
     """`[..., d]`, of any length above zero."""
     length: jax.Array
     """`[...]` [rad]."""
+    base: jax.Array | None = None
+    """`[..., d]` where the segment is meant to begin [rad]; None = wherever the base is."""
 
 
 class Proposal(NamedTuple):

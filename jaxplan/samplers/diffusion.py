@@ -19,18 +19,18 @@ def draw(
     steps = diffusion.timesteps(config.num_train_timesteps, config.num_inference_steps)
     x_0 = diffusion.ddim(
         denoiser(config, params, cond, steps),
-        noise(keys, n, len(config.q_min) + 1),
+        noise(keys, n, config.size),
         config.num_train_timesteps,
         steps,
-        clip=diffusion.bounds(len(config.q_min)),
+        clip=diffusion.bounds(len(config.q_min), config.tree_context),
     )
-    return segments(config, x_0)
+    return segments(config, x_0, cond)
 
 
 def denoiser(
     config: SamplerConfig, params: dict, cond: Cond, steps: np.ndarray
 ) -> diffusion.Denoise:
-    """(x_t [P, n, 8], t) -> the network's output, for t among `steps`.
+    """(x_t [P, n, size], t) -> the network's output, for t among `steps`.
 
     The FiLM vectors of all noise steps are made here, once per problem: of the loop, only
     the denoiser itself is left.
@@ -53,6 +53,11 @@ def noise(keys: jax.Array, n: int, size: int) -> jax.Array:
     return jax.vmap(lambda key: jax.random.normal(key, (n, size)))(keys)
 
 
-def segments(config: SegmentConfig, x_0: jax.Array) -> Segment:
-    """x_0 [..., 8] as a Segment."""
-    return Segment(*diffusion.decode(x_0, config.step_min, config.step_max))
+def segments(config: SegmentConfig, x_0: jax.Array, cond: Cond) -> Segment:
+    """x_0 [P, n, size] as a Segment."""
+    joints, steps = len(config.q_min), (config.step_min, config.step_max)
+    direction, length = diffusion.decode(x_0, joints, *steps)
+    if not config.tree_context:
+        return Segment(direction, length)
+    q = jnp.broadcast_to(cond.q[:, None], direction.shape)
+    return Segment(direction, length, diffusion.decode_base(x_0, q))

@@ -36,6 +36,6 @@ def draw(
         n: Segments per problem.
 
     Returns:
-        Segment with direction [P, n, 7] and length [P, n] [rad].
+        Segment with direction [P, n, 7], length [P, n] [rad], and with `tree_context` base.
     """
     return _DRAW[type(config)](config, params, cond, keys, n)

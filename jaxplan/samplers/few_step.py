@@ -33,12 +33,12 @@ def draw(
 
     x_0 = diffusion.ddim(
         denoise,
-        noise(keys, n, len(config.q_min) + 1),
+        noise(keys, n, config.size),
         config.num_train_timesteps,
         steps,
-        clip=diffusion.bounds(len(config.q_min)),
+        clip=diffusion.bounds(len(config.q_min), config.tree_context),
     )
-    return segments(config, x_0)
+    return segments(config, x_0, cond)
 
 
 def timesteps(config: FewStepConfig) -> np.ndarray:

@@ -17,4 +17,4 @@ def draw(
     model: Any = network(config)
     vector = model.apply(params, cond, method="cond")[:, None]
     z = noise(keys, n, config.latent)
-    return segments(config, model.apply(params, z, vector, method="generate"))
+    return segments(config, model.apply(params, z, vector, method="generate"), cond)
