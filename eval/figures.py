@@ -10,7 +10,7 @@ its segments, begun at nodes along the path that the search found. Uniform propo
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
@@ -28,6 +28,7 @@ from jaxplan.learning.pretrained import DIRECTORY
 from jaxplan.rollout import Phase
 from jaxplan.tasks.mug import painter
 from jaxplan.tasks.mug.painter import Moment, Painter
+from jaxplan.tasks.mug.scene import Variant
 
 SAMPLERS = {"Diffusion (ours)": "sampler", "CVAE": "cvae", "Conditional GAN": "gan"}
 TOGGLES = ("rim grasp", "release", "handle grasp", "placing")
@@ -42,12 +43,13 @@ class Args:
     seeds: str = "100000:100008"
     """Episodes to choose from: the first that succeed are drawn."""
     out: Path = Path("runs/figures")
-    weights: Path = DIRECTORY
-    """Directory with predictor, samplers and manifest."""
+    variant: Variant = "plain"
+    """Of the scene."""
+    weights: Path | None = None
+    """Directory with predictor, samplers and manifest; by default the shipped ones."""
     figures: tuple[int, ...] = (2, 3, 4, 5)
     quick: bool = False
     """Two episodes."""
-    study: Success = Success()
 
 
 class Scene(NamedTuple):
@@ -88,8 +90,10 @@ def main(args: Args) -> None:
     """Runs the episodes, draws the figures, prints where they are."""
     seeds = parse_seeds(args.seeds)
     seeds = seeds[:2] if args.quick else seeds
-    weights = load_pair(args.weights)
-    study = Study(weights, replace(args.study, batch=len(seeds)))
+    plain = args.variant == "plain"
+    directory = args.weights or (DIRECTORY if plain else DIRECTORY / args.variant)
+    weights = load_pair(directory)
+    study = Study(weights, Success(batch=len(seeds), variant=args.variant))
     paint = Painter(study.task, "near", scale=2)
     recorder = Recorder(study, paint)
     result = study.run(seeds, listen=recorder)
@@ -108,7 +112,7 @@ def main(args: Args) -> None:
         elif number == 4:
             page = figure4(paint, episodes[:3], names[:3])
         elif number == 5:
-            page = figure5(paint, study, args.weights, weights[0], episodes[0])
+            page = figure5(paint, study, directory, weights[0], episodes[0])
         else:
             raise ValueError(f"figure {number}: 2, 3, 4 or 5")
         path = args.out / f"figure{number}.png"

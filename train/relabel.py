@@ -19,6 +19,7 @@ from jaxplan.motion import MotionPlanner
 from jaxplan.rollout import rollout
 from jaxplan.scene.panda import PANDA_LIMITS
 from jaxplan.tasks.mug.relabel import Relabeler
+from jaxplan.tasks.mug.scene import Variant
 from jaxplan.tasks.mug.task import MugTask
 
 
@@ -32,6 +33,7 @@ class Args:
     first_seed: int = 50_000
     shard_size: int = 32
     camera: str = "hand"
+    variant: Variant = "plain"
 
 
 def main(args: Args) -> None:
@@ -50,7 +52,7 @@ def main(args: Args) -> None:
     count = -(-args.episodes // args.shard_size)
     missing = data.missing_shards(args.out, count, settings)
     data.write_manifest(args.out, settings)
-    task = MugTask(args.shard_size, args.camera)
+    task = MugTask(args.shard_size, args.camera, variant=args.variant)
     planner = MotionPlanner(task.planning_scene, PANDA_LIMITS)
     agent = Agent(*weights, args.shard_size)
     bar = tqdm(missing, unit="shard")
