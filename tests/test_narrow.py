@@ -1,6 +1,7 @@
 """Signed distances of every pair of kinds against C MuJoCo, and their laws."""
 
 from functools import cache
+from itertools import combinations_with_replacement
 from types import SimpleNamespace
 from typing import Any
 
@@ -11,7 +12,8 @@ import numpy as np
 import pytest
 
 from jaxplan.collision import XLA_OPTIONS
-from jaxplan.collision.narrow import FUNCTIONS
+from jaxplan.collision.convex import least_convex
+from jaxplan.collision.narrow import CLOSED, SOLID
 from jaxplan.collision.shapes import Score, Shapes, in_world, read
 
 BAND = 1e-4
@@ -20,6 +22,10 @@ ROWS = 128
 HULL = 56
 # Half the time to compile, and the same sums.
 QUICK = {**XLA_OPTIONS, "xla_backend_optimization_level": 0}
+PAIRS = [
+    *CLOSED,
+    *(pair for pair in combinations_with_replacement(SOLID, 2) if pair not in CLOSED),
+]
 CUBE = np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, -1).T
 
 
@@ -112,13 +118,16 @@ def samples(
 @cache
 def rated(kinds: tuple[str, str]):
     """Jitted: distance, whether free, whether farther apart than a margin."""
-    function = FUNCTIONS[kinds]
+
+    def least(a: Shapes, b: Shapes, score: Score) -> jax.Array:
+        if kinds in CLOSED:
+            return CLOSED[kinds](a, b, score)[0]
+        parts = list(zip(kinds, (a, b), strict=True))
+        return least_convex(parts, np.array([[0, 1]]), jnp.ones((1, 1), bool), score)
 
     def rate(a: Shapes, b: Shapes, margin: jax.Array):
-        return (
-            function(a, b, Score(exact=True))[0],
-            function(a, b, Score(exact=False, margin=margin))[0] > 0,
-        )
+        free = least(a, b, Score(exact=False, margin=margin)) > 0
+        return least(a, b, Score(exact=True)), free
 
     return jax.jit(rate, compiler_options=QUICK)
 
@@ -133,22 +142,25 @@ def cores_apart(kinds, a: Shapes, b: Shapes, distance: np.ndarray) -> np.ndarray
     return distance + radius > BAND
 
 
-@pytest.mark.parametrize("kinds", FUNCTIONS, ids="/".join)
+@pytest.mark.parametrize("kinds", PAIRS, ids="/".join)
 def test_every_pair_of_kinds_agrees_with_mujoco(kinds: tuple[str, str]):
-    excess = []
+    excess, errors = [], []
     for a, b, expected in samples(kinds):
         distance, free = map(np.asarray, rated(kinds)(a, b, 0.0))
         apart = expected > 0
         clear = np.abs(expected) > BAND
         np.testing.assert_array_equal((distance > 0)[clear], apart[clear])
         np.testing.assert_array_equal(free[clear], apart[clear])
-        np.testing.assert_allclose(distance[apart], expected[apart], atol=3e-5)
+        np.testing.assert_allclose(distance[apart], expected[apart], atol=BAND)
+        errors.append(np.abs(distance - expected)[apart])
         _, beyond = rated(kinds)(a, b, MARGIN)
-        clear = np.abs(expected - MARGIN) > 3e-5
+        clear = np.abs(expected - MARGIN) > BAND
         np.testing.assert_array_equal(beyond[clear], (expected > MARGIN)[clear])
         shallow = ~apart & cores_apart(kinds, a, b, expected)
-        np.testing.assert_allclose(distance[shallow], expected[shallow], atol=3e-5)
+        np.testing.assert_allclose(distance[shallow], expected[shallow], atol=BAND)
         excess.append((expected - distance)[~apart & ~shallow])
+    # Searches that stall next to contact leave less than the band.
+    assert np.quantile(np.concatenate(errors), 0.95) < 1e-5
     over = np.concatenate(excess)
     assert over.min(initial=0) > -1e-5  # never less deep than it is
     if "plane" in kinds or set(kinds) <= {"sphere", "capsule", "box"}:

@@ -4,17 +4,20 @@ The points a - b of two geoms form a convex set that holds the origin where the 
 meet, and whose distance from the origin is theirs. Spheres and capsules enter as a
 point and a segment with a radius.
 
-Of most pairs a look at their boxes says enough. The others are gathered and searched a
-tile at a time, so that no pair waits for another in a distant part of the batch.
+All pairs of a scene go the same way, so that it compiles once. Of most a look at balls,
+then at boxes says enough. The others are gathered and searched a tile at a time, so that
+no pair waits for another in a distant part of the batch.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from functools import partial, reduce
 from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 
-from jaxplan.collision.gjk import Support, nearest_point
+from jaxplan.collision.gjk import nearest_point
 from jaxplan.collision.shapes import (
     Score,
     Shapes,
@@ -25,17 +28,11 @@ from jaxplan.collision.shapes import (
     minus,
     once,
     plus,
+    smaller,
     times,
     where,
 )
-from jaxplan.collision.solids import (
-    TINY,
-    extends,
-    farthest,
-    half_extents,
-    inner_radius,
-    radius_of,
-)
+from jaxplan.collision.solids import TINY, Cores, cores_of, farthest, stacked
 
 Best = tuple[jax.Array, Vector]
 """A signed distance found [m], and the direction."""
@@ -44,123 +41,125 @@ TILE = 256
 """Pairs that are searched together: few enough for the cache."""
 ROUNDS = 2
 """Searches for a shorter way out of something round or a mesh, see `_depth`."""
+SLACK = 1e-4
+"""Bounds that differ by less [m] may be rounding."""
 
 
-def convex_convex(
-    kinds: tuple[str, str], a: Shapes, b: Shapes, score: Score
+def least_convex(
+    parts: Sequence[tuple[str, Shapes]],
+    pairs: np.ndarray,
+    counts: jax.Array,
+    score: Score,
 ) -> jax.Array:
-    """Least score of each geom of a over the obstacles b.
+    """Least score over pairs of convex geoms, no planes.
 
     Args:
-        kinds: Of a and of b; no planes.
-        a: Leaves `[n, B]` or `[n, 1]`.
-        b: Leaves `[m, B]` or `[m, 1]`.
+        parts: Geoms in one frame by kind, leaves `[n, B]` or `[n, 1]`.
+        pairs: `[P, 2]` geoms, counted through all parts.
+        counts: `[P, B]` or `[P, 1]` whether a pair counts.
         score: What is rated.
 
     Returns:
-        `[n, B]`. Distances are good to some micrometres. Where geoms penetrate, the
-        depth is exact between spheres, capsules and boxes and wherever the cores do not
-        meet; otherwise it is that of some way out, so an upper bound (`_depth`).
+        `[B]`, infinite where nothing counts. Distances are good to some micrometres. Where
+        geoms penetrate, the depth is exact between spheres, capsules and boxes and wherever
+        the cores do not meet; otherwise it is that of some way out, so an upper bound
+        (`_depth`).
     """
-    one, other = kinds
-    facing = Shapes(*jax.tree.map(lambda leaf: leaf[:, None], tuple(b)[:3]))
-    radius = radius_of(one, a) + radius_of(other, facing)
-    least, most = _bounds(kinds, a, b)
-    if score.exact:  # the slack is for rounding
-        near = least - radius <= jnp.min(most - radius, 0) + 1e-4
-    else:
-        near = least <= radius + score.margin
-
-    def squared(pair: Pair) -> jax.Array:
-        reach = None if score.exact else pair.radius + score.margin
-        return nearest_point(pair.support, pair.offset, reach)[1]
-
-    def depth(pair: Pair) -> jax.Array:
-        return _depth(pair, 0 if set(kinds) <= {"sphere", "capsule", "box"} else ROUNDS)
-
-    found = _in_tiles(squared, kinds, a, b, near, jnp.inf)
-    scores = score.of_squared(found, radius)
+    cores = stacked([cores_of(kind, shapes) for kind, shapes in parts])
+    kinds = np.repeat([kind for kind, _ in parts], [len(s.size[0]) for _, s in parts])
+    mesh = kinds == "mesh"
+    flip = mesh[pairs[:, 1]] & ~mesh[pairs[:, 0]]
+    a, b = np.where(flip[:, None], pairs[:, ::-1], pairs).T
+    radius = cores.radius[a] + cores.radius[b]
+    least, most = _balls(cores, a, b)
     if score.exact:
-        scores -= _in_tiles(depth, kinds, a, b, found == 0, 0.0)
-    return jnp.min(scores, 0)
+        reach = jnp.min(jnp.where(counts, most - radius, jnp.inf), 0) + SLACK
+    else:
+        reach = score.margin
+    near = (least - radius <= reach) & counts
+    rated = []
+    for one, other in ((False, False), (True, False), (True, True)):
+        (rows,) = np.nonzero((mesh[a] == one) & (mesh[b] == other))
+        if not len(rows):
+            continue
+        simple = set(kinds[[*a[rows], *b[rows]]]) <= {"sphere", "capsule", "box"}
+        tiles = partial(_in_tiles, cores, a[rows], b[rows], (one, other))
+        thick = radius[rows]
+        close = tiles(_box_gap, near[rows], jnp.inf) - thick <= reach
+        found = tiles(partial(_squared, score), close, jnp.inf)
+        scores = score.of_squared(found, thick)
+        if score.exact:
+            depth = partial(_depth, 0 if simple else ROUNDS)
+            scores -= tiles(depth, found == 0, 0.0)
+        rated.append(jnp.min(scores, 0))
+    return reduce(smaller, rated)
+
+
+def _balls(cores: Cores, a: np.ndarray, b: np.ndarray) -> tuple[jax.Array, jax.Array]:
+    """The signed distance of cores is at least and at most this, `[P, B]` [m]."""
+    outer = jnp.sqrt(dot(cores.bounds, cores.bounds))
+    offset = [x[a] - x[b] for x in cores.centre]
+    distance = jnp.sqrt(dot(offset, offset))
+    least = distance - (outer[a] + outer[b])
+    # Balls that meet say nothing of depth.
+    least = jnp.where(least > 0, least, -jnp.inf)
+    return least, distance - (cores.inner[a] + cores.inner[b])
 
 
 class Pair(NamedTuple):
-    """A geom and an obstacle in the obstacle's frame, where rounding is least."""
+    """Geoms a and b in b's frame, where rounding is least; leaves `[tile]`."""
 
-    support: Support
-    """Of the points a - b."""
+    a: Cores
+    b: Cores
     offset: Vector
-    """From the obstacle's centre to the geom's, each `[tile]` [m]."""
+    """From b's centre to a's [m]."""
     axes: list[Vector]
-    """The geom's."""
-    radius: jax.Array
-    """Of both together [m]."""
+    """Those of a."""
 
-
-def _pair(kinds: tuple[str, str], a: Shapes, b: Shapes) -> Pair:
-    """Leaves `[tile]`."""
-    one, other = kinds
-    offset = [dot(axis, minus(a.centre, b.centre)) for axis in b.axes]
-    axes = [[dot(axis, own) for axis in b.axes] for own in a.axes]
-    offset, axes = once((offset, axes))
-
-    def support(against: Vector) -> Vector:
-        own = once(farthest(one, a, [-dot(axis, against) for axis in axes]))
-        point = minus(offset, farthest(other, b, against))
-        for i in extends(one):
-            point = plus(point, times(own[i], axes[i]))
+    def support(self, against: Vector) -> Vector:
+        """The point of the a - b that lies farthest against a direction."""
+        own = farthest(self.a, [-dot(axis, against) for axis in self.axes])
+        own = once(own)
+        point = minus(self.offset, farthest(self.b, against))
+        for x, axis in zip(own, self.axes, strict=True):
+            point = plus(point, times(x, axis))
         return point
-
-    return Pair(support, offset, axes, radius_of(one, a) + radius_of(other, b))
-
-
-def _bounds(
-    kinds: tuple[str, str], a: Shapes, b: Shapes
-) -> tuple[jax.Array, jax.Array]:
-    """The signed distance of the cores is at least and at most this, `[m, n, B]` [m]."""
-    half_a, half_b = half_extents(kinds[0], a), half_extents(kinds[1], b)
-    inner = inner_radius(kinds[0], a) + inner_radius(kinds[1], b)[:, None]
-    b = Shapes(*jax.tree.map(lambda leaf: leaf[:, None], tuple(b)[:3]))
-    offset = [dot(axis, minus(a.centre, b.centre)) for axis in b.axes]
-    beyond = []
-    for k in range(3):
-        extent = half_b[k][:, None]
-        for i in extends(kinds[0]):
-            extent = extent + jnp.abs(dot(b.axes[k], a.axes[i])) * half_a[i]
-        beyond.append(larger(jnp.abs(offset[k]) - extent, 0.0))
-    gap = jnp.sqrt(dot(beyond, beyond))
-    least = jnp.where(gap > 0, gap, -jnp.inf)  # boxes that meet say nothing of depth
-    return least, jnp.sqrt(dot(offset, offset)) - inner
 
 
 def _in_tiles(
+    cores: Cores,
+    a: np.ndarray,
+    b: np.ndarray,
+    meshes: tuple[bool, bool],
     function: Callable[[Pair], jax.Array],
-    kinds: tuple[str, str],
-    a: Shapes,
-    b: Shapes,
     chosen: jax.Array,
     otherwise: float,
 ) -> jax.Array:
-    """`function` of the chosen pairs `[m, n, B]`, a tile of them at a time on a CPU."""
+    """`function` of the chosen pairs `[P, B]`, a tile of them at a time on a CPU."""
     size = chosen.size
     tile = min(TILE, size) if jax.default_backend() == "cpu" else size
     slots = -(-size // tile) * tile
     (order,) = jnp.nonzero(chosen.reshape(-1), size=slots, fill_value=size)
     count = jnp.sum(chosen)
 
-    def pick(shapes: Shapes, rows: jax.Array, columns: jax.Array) -> Shapes:
+    def pick(rows: jax.Array, columns: jax.Array, mesh: bool) -> Cores:
         def one(leaf: jax.Array) -> jax.Array:
             return leaf[rows, columns if leaf.shape[-1] > 1 else 0]
 
-        picked = Shapes(*jax.tree.map(one, tuple(shapes)[:3]))
-        return picked._replace(vertices=[x[:, rows, 0] for x in shapes.vertices])
+        picked = jax.tree.map(one, cores._replace(vertices=()))
+        vertices = [x[:, rows, 0] for x in cores.vertices] if mesh else ()
+        return picked._replace(vertices=vertices)
 
     def search(state: tuple[jax.Array, jax.Array]) -> tuple[jax.Array, jax.Array]:
         done, values = state
         places = jax.lax.dynamic_slice(order, (done,), (tile,))
-        j, i, k = jnp.unravel_index(places, chosen.shape)
-        found = function(_pair(kinds, pick(a, i, k), pick(b, j, k)))
+        row, column = jnp.unravel_index(places, chosen.shape)
+        one = pick(jnp.asarray(a)[row], column, meshes[0])
+        other = pick(jnp.asarray(b)[row], column, meshes[1])
+        offset = [dot(axis, minus(one.centre, other.centre)) for axis in other.axes]
+        axes = [[dot(axis, own) for axis in other.axes] for own in one.axes]
+        offset, axes = once((offset, axes))
+        found = function(Pair(one, other, offset, axes))
         return done + tile, values.at[places].set(found, mode="drop")
 
     values = jnp.full(size, otherwise)
@@ -169,7 +168,25 @@ def _in_tiles(
     return values.reshape(chosen.shape)
 
 
-def _depth(pair: Pair, rounds: int) -> jax.Array:
+def _box_gap(pair: Pair) -> jax.Array:
+    """The cores are at least so far apart, `[tile]` [m]: as the boxes around them."""
+    beyond = []
+    for k in range(3):
+        extent = pair.b.bounds[k]
+        for half, axis in zip(pair.a.bounds, pair.axes, strict=True):
+            extent = extent + jnp.abs(axis[k]) * half
+        beyond.append(larger(jnp.abs(pair.offset[k]) - extent, 0.0))
+    gap = jnp.sqrt(dot(beyond, beyond))
+    return jnp.where(gap > 0, gap, -jnp.inf)  # boxes that meet say nothing of depth
+
+
+def _squared(score: Score, pair: Pair) -> jax.Array:
+    """Squared distance of the cores, `[tile]` [m^2]."""
+    reach = None if score.exact else pair.a.radius + pair.b.radius + score.margin
+    return nearest_point(pair.support, pair.offset, reach)[1]
+
+
+def _depth(rounds: int, pair: Pair) -> jax.Array:
     """How far the geom's core can be moved to leave the obstacle's, `[tile]` [m].
 
     Tries the line between the centres, both geoms' axes and their cross products, which

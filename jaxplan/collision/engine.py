@@ -13,8 +13,9 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from jaxplan.collision.convex import least_convex
 from jaxplan.collision.kinematics import link_poses, rotation_of
-from jaxplan.collision.narrow import FUNCTIONS
+from jaxplan.collision.narrow import CLOSED
 from jaxplan.collision.shapes import (
     Score,
     Shapes,
@@ -24,7 +25,7 @@ from jaxplan.collision.shapes import (
     smaller,
 )
 from jaxplan.collision.world import World
-from jaxplan.scene import Geoms, Scene
+from jaxplan.scene import Geoms, Scene, geom_pairs
 
 XLA_OPTIONS: dict[str, str | bool] = {"xla_cpu_use_fusion_emitters": False}
 """Compiler options for the outermost `jax.jit` of anything that checks collisions: with
@@ -46,6 +47,17 @@ class Front(NamedTuple):
     kinds: tuple[str, str]
 
 
+class ConvexPairs(NamedTuple):
+    """Pairs of geoms whose distance has no closed form."""
+
+    geoms: dict[tuple[str, bool], tuple[int, ...]]
+    """Their ids, by kind and whether they are in slots."""
+    pairs: tuple[tuple[int, int], ...]
+    """Geom ids."""
+    groups: tuple[int, ...]
+    """Contact group of each pair."""
+
+
 def least_scores(scene: Scene, world: World, q: jax.Array, score: Score) -> jax.Array:
     """Least score over all pairs that count.
 
@@ -60,7 +72,7 @@ def least_scores(scene: Scene, world: World, q: jax.Array, score: Score) -> jax.
     """
     if not scene.groups:
         return jnp.full(q.shape[-1], jnp.inf)
-    fronts = _fronts(scene)
+    fronts, pairs = _fronts(scene), _convex_pairs(scene)
     slots = {slot.geom: index for index, slot in enumerate(scene.slots)}
 
     def shapes(ids: tuple[int, ...], world: World) -> Shapes:
@@ -70,7 +82,7 @@ def least_scores(scene: Scene, world: World, q: jax.Array, score: Score) -> jax.
 
     def scores(front: Front, poses: jax.Array, world: World) -> jax.Array:
         own = in_world(shapes(front.facing, world), poses, np.array(front.links))
-        function = FUNCTIONS[front.kinds]
+        function = CLOSED[front.kinds]
         if front.obstacles[0].ids[0] in slots:
             (obstacles,) = front.obstacles
             rows = [slots[geom] for geom in obstacles.ids]
@@ -80,6 +92,20 @@ def least_scores(scene: Scene, world: World, q: jax.Array, score: Score) -> jax.
         rated = [function(near, shapes(o.ids, world), score) for o in front.obstacles]
         return reduce(smaller, rated)
 
+    def convex(poses: jax.Array, world: World, counts: jax.Array) -> jax.Array:
+        parts, row = [], {}
+        for (kind, moves), ids in pairs.geoms.items():
+            own = shapes(ids, world)
+            if not moves:
+                links = [
+                    scene.structure.link_of[scene.mj_model.geom_bodyid[g]] for g in ids
+                ]
+                own = in_world(own, poses, np.array(links))
+            row |= {geom: len(row) + i for i, geom in enumerate(ids)}
+            parts.append((kind, own))
+        rows = np.array([[row[a], row[b]] for a, b in pairs.pairs])
+        return least_convex(parts, rows, counts[np.array(pairs.groups)], score)
+
     def block(q: jax.Array, world: World) -> jax.Array:
         poses = link_poses(scene, world, q)
         counts = _counts(scene, world)
@@ -88,6 +114,8 @@ def least_scores(scene: Scene, world: World, q: jax.Array, score: Score) -> jax.
             rated = scores(front, poses, world)
             rated = jnp.where(counts[np.array(front.groups)], rated, jnp.inf)
             least.append(jnp.min(rated, 0))
+        if pairs.pairs:
+            least.append(convex(poses, world, counts))
         return reduce(smaller, least)
 
     return _in_blocks(block, q, world)
@@ -124,11 +152,13 @@ def _least_over_slots(
 
 
 def _fronts(scene: Scene) -> list[Front]:
-    """Contacts, put together by obstacle and then by who faces it, slots apart."""
+    """Contacts in closed form, put together by obstacle and by who faces it, slots apart."""
     facing = defaultdict(list)
     slots = {slot.geom for slot in scene.slots}
     for index, group in enumerate(scene.groups):
         for contact in group.contacts:
+            if (contact.a.kind, contact.b.kind) not in CLOSED:
+                continue
             moves = contact.a.ids[0] in slots
             facing[contact.b, contact.a.kind, moves].append((contact.a, index))
     together = defaultdict(list)
@@ -142,6 +172,27 @@ def _fronts(scene: Scene) -> list[Front]:
         links = tuple(scene.structure.link_of[body] for body in bodies)
         fronts.append(Front(geoms, links, groups, tuple(obstacles), kinds))
     return fronts
+
+
+def _convex_pairs(scene: Scene) -> ConvexPairs:
+    """The other contacts, pair by pair."""
+    slots = {slot.geom for slot in scene.slots}
+    geoms: dict[tuple[str, bool], dict[int, None]] = defaultdict(dict)
+    pairs: list[tuple[int, int]] = []
+    groups: list[int] = []
+    for index, group in enumerate(scene.groups):
+        for contact in group.contacts:
+            if (contact.a.kind, contact.b.kind) in CLOSED:
+                continue
+            for side in (contact.a, contact.b):
+                for geom in side.ids:
+                    geoms[side.kind, geom in slots][geom] = None
+            own = geom_pairs(contact)
+            pairs += own
+            groups += [index] * len(own)
+    return ConvexPairs(
+        {key: tuple(ids) for key, ids in geoms.items()}, tuple(pairs), tuple(groups)
+    )
 
 
 def _counts(scene: Scene, world: World) -> jax.Array:

@@ -8,12 +8,10 @@ cache; boolean reductions, or obstacles as an axis, are ten times slower.
 
 from collections.abc import Callable, Iterable, Iterator
 from functools import partial, reduce
-from itertools import combinations_with_replacement
 
 import jax
 import jax.numpy as jnp
 
-from jaxplan.collision.convex import convex_convex
 from jaxplan.collision.shapes import (
     Score,
     Shapes,
@@ -23,7 +21,7 @@ from jaxplan.collision.shapes import (
     smaller,
     times,
 )
-from jaxplan.collision.solids import farthest, radius_of
+from jaxplan.collision.solids import cores_of, farthest
 
 
 def _clip(x: jax.Array, bound: jax.Array) -> jax.Array:
@@ -55,14 +53,15 @@ def sphere_plane(a: Shapes, b: Shapes, score: Score) -> jax.Array:
 
 def convex_plane(kind: str, a: Shapes, b: Shapes, score: Score) -> jax.Array:
     """Height of the lowest point."""
+    cores = cores_of(kind, a)
 
     def one(o: Shapes) -> jax.Array:
         normal = o.axes[2]
         up = [dot(axis, normal) for axis in a.axes]
-        lowest = dot(farthest(kind, a, [-x for x in up]), up)
+        lowest = dot(farthest(cores, [-x for x in up]), up)
         return dot(minus(a.centre, o.centre), normal) + lowest
 
-    return score.of(_least(map(one, _each(b))), radius_of(kind, a))
+    return score.of(_least(map(one, _each(b))), cores.radius)
 
 
 def sphere_sphere(a: Shapes, b: Shapes, score: Score) -> jax.Array:
@@ -143,7 +142,9 @@ def sphere_box(a: Shapes, b: Shapes, score: Score) -> jax.Array:
     return _least(map(one, _each(b)))
 
 
+SOLID = ("sphere", "capsule", "ellipsoid", "cylinder", "box", "mesh")
 CLOSED: dict[tuple[str, str], Callable[[Shapes, Shapes, Score], jax.Array]] = {
+    **{(kind, "plane"): partial(convex_plane, kind) for kind in SOLID},
     ("sphere", "sphere"): sphere_sphere,
     ("sphere", "capsule"): sphere_capsule,
     ("sphere", "cylinder"): sphere_cylinder,
@@ -151,13 +152,5 @@ CLOSED: dict[tuple[str, str], Callable[[Shapes, Shapes, Score], jax.Array]] = {
     ("sphere", "plane"): sphere_plane,
     ("capsule", "capsule"): capsule_capsule,
 }
-SOLID = ("sphere", "capsule", "ellipsoid", "cylinder", "box", "mesh")
-FUNCTIONS = {
-    **{
-        kinds: partial(convex_convex, kinds)
-        for kinds in combinations_with_replacement(SOLID, 2)
-    },
-    **{(kind, "plane"): partial(convex_plane, kind) for kind in SOLID},
-    **CLOSED,
-}
-"""Least score of each geom of a over the obstacles b, `[n, B]`, by kinds."""
+"""Least score of each geom of a over the obstacles b, `[n, B]`, by kinds. What is not here
+is for `convex`."""
