@@ -6,9 +6,11 @@ import math
 import sys
 from pathlib import Path
 
+import jax
 import numpy as np
 import pytest
 
+from jaxplan.agent import Agent
 from jaxplan.config import PAPER_PLANNER
 from jaxplan.data import DataError
 from jaxplan.evaluation import problems as store
@@ -18,6 +20,10 @@ from jaxplan.evaluation.methods import BACKBONES, METHODS, planner
 from jaxplan.evaluation.problems import Problems
 from jaxplan.evaluation.statistics import bootstrap
 from jaxplan.evaluation.tables import Estimate, Table, cell, markdown
+from jaxplan.learning import load_pair
+from jaxplan.networks import Cond
+from jaxplan.rollout import Targets, _keys
+from jaxplan.tasks.mug.task import Observation
 
 sys.path.append(str(Path(__file__).parents[1] / "eval"))
 EVERY = np.ones(4, bool)
@@ -142,6 +148,44 @@ def test_a_damaged_shard_is_named_and_made_again(tmp_path):
     with pytest.raises(DataError, match=r"p0\.npz"):
         store.read(tmp_path, ["p0.npz"])
     assert store.begin(tmp_path, {}) == {}
+
+
+def test_keys_are_those_of_the_outer_loop():
+    """A recorded problem is searched with the random numbers of its episode."""
+    problems = some_problems((7, 9))._replace(phase=np.array([4, 4]))
+    expected = _keys([7, 9], 2, 4)
+    assert jax.numpy.array_equal(problems.keys(), expected)
+
+
+def test_banks_are_what_the_agent_draws():
+    """For each problem, in any order and company, the segments that an episode would get."""
+    from jaxplan.evaluation.searches import Banks
+
+    predictor, sampler = load_pair()
+    problems = some_problems((3, 5, 8))
+    agent = Agent(predictor, sampler, 3)
+    lanes = [0, 1, 2]
+    agent.predict(Observation(problems.image, problems.q, problems.gripper), lanes)
+    targets = Targets(problems.q_toggle, problems.gripper_toggle > 0.5, problems.target)
+    seen = Observation(problems.image, problems.q, problems.gripper)
+    expected = agent.propose(seen, targets, lanes, problems.keys())(np.array([0, 2, 1]))
+    cond = Cond(
+        image=np.asarray(agent._features),
+        q=problems.q,
+        gripper=problems.gripper,
+        q_toggle=problems.q_toggle,
+        gripper_toggle=targets.gripper_toggle,
+        q_goal=problems.target,
+    )
+    banks = Banks(sampler, cond, problems.keys())
+    banks.of(np.array([1, 2]))(np.array([0, 0]))
+    found = banks.of(np.array([2, 0, 1]))(np.array([1, 0, 2]))
+    for name in ("direction", "length"):
+        np.testing.assert_allclose(
+            getattr(found, name),
+            getattr(expected, name)[np.array([2, 0, 1])],
+            atol=1e-4,
+        )
 
 
 @pytest.mark.parametrize("backbone", BACKBONES, ids=lambda backbone: backbone.name)

@@ -8,9 +8,10 @@ from typing import Any
 
 from jaxplan.data import write_atomic
 
-PLANNING = ("planning", "collision", "scene")
+PLANNING = ("planning",)
 SAMPLING = (*PLANNING, "samplers", "diffusion", "networks")
-"""Packages whose code decides what a piece's result is."""
+"""Packages whose code decides what a piece's result is. Not `collision`: its verdicts are C
+MuJoCo's, however they are computed."""
 
 
 class Memo:
