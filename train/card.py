@@ -17,6 +17,8 @@ from jaxplan.tasks.mug.poses import RANGE, sample_pose
 
 BINS = 3
 """Along each coordinate of the pose."""
+PITCH = round(float(np.degrees(RANGE.pitch)), 1)
+ROLL = round(float(np.degrees(RANGE.roll)), 1)
 
 
 def write_card(directory: Path) -> None:
@@ -43,10 +45,8 @@ def describe(shard: Shard, settings: dict[str, Any]) -> dict[str, Any]:
             "y [m]": list(RANGE.y),
             "direction of the opening [deg]": np.degrees(RANGE.yaw).round(1).tolist(),
             "side of the handle": ["left", "right"],
-            "handle off its resting place [deg]": [0.0, float(np.degrees(RANGE.roll))],
-            "pitch [deg]": [
-                float(np.degrees(sign * RANGE.pitch)) for sign in (-1.0, 1.0)
-            ],
+            "handle off its resting place [deg]": [0.0, ROLL],
+            "pitch [deg]": [-PITCH, PITCH],
             "share of episodes driven beside their labels": noisy,
         },
         "episodes": len(success),
@@ -118,7 +118,9 @@ def _share(success: np.ndarray) -> str:
 
 def _table(left: str, right: str, rows: dict[str, Any]) -> list[str]:
     def cell(value: Any) -> str:
-        return " to ".join(map(str, value)) if isinstance(value, list) else str(value)
+        if not isinstance(value, list):
+            return str(value)
+        return (" or " if isinstance(value[0], str) else " to ").join(map(str, value))
 
     body = [f"| {name} | {cell(value)} |" for name, value in rows.items()]
     return [f"| {left} | {right} |", "|---|---|", *body, ""] if rows else []
