@@ -9,6 +9,7 @@ the run's newest checkpoint. `--help` lists every setting.
 import argparse
 import dataclasses
 import difflib
+import hashlib
 import logging
 import runpy
 import sys
@@ -152,10 +153,7 @@ def train_sampler(kind: str, config: SegmentTraining) -> Path:
         upper = learning.load_weights("predictor", config.predictor)
     loss = _sampler_loss(kind, config, upper)
     shard, origin = _read(config)
-    image = shard.image
-    if upper is not None:
-        logger.info("image features of %d frames, once", len(image))
-        image = predictor.image_features(upper.config, upper.params, image)
+    image = shard.image if upper is None else _features(upper, shard, origin["data"])
     held = learning.held_out(shard.seed, config.val_fraction)
     rows, val_rows = _split(segments.eligible(shard, config.network.step_min), held)
     fresh = jax.jit(init, static_argnums=(0, 2))(
@@ -209,6 +207,21 @@ def _read(config: TrainConfig) -> tuple[data.Shard, dict[str, Any]]:
     settings = [data.read_manifest(d)["settings"] for d in config.data]
     tasks = sorted({each["task"] for each in settings if "task" in each})
     return shard, {"data": hashes, "tasks": tasks}
+
+
+def _features(
+    upper: learning.Weights, shard: data.Shard, hashes: dict[str, str]
+) -> np.ndarray:
+    """The predictor's image features of all frames, kept for the next sampler's training."""
+    of = hashlib.sha256("".join([upper.info["sha256"], *hashes.values()]).encode())
+    path = RUNS / "features" / f"{of.hexdigest()[:16]}.npz"
+    if path.is_file():
+        with np.load(path) as archive:
+            return archive["features"]
+    logger.info("image features of %d frames, once", len(shard.image))
+    features = predictor.image_features(upper.config, upper.params, shard.image)
+    data.write_npz(path, {"features": features})
+    return features
 
 
 def _split(rows: np.ndarray, held: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -23,6 +23,7 @@ from planning_spheres import (
 from jaxplan.config import PAPER_PLANNER
 from jaxplan.planning import PlanResult, Segment, Status, lanes, make_planner, search
 from jaxplan.planning.edges import all_free, motions_free, points_for, stages
+from jaxplan.planning.proposal import adapted, draw_numbers
 from jaxplan.planning.state import Query
 
 METHODS = ("rrt", "rrt_connect")
@@ -275,20 +276,16 @@ def test_batched_search_is_the_sequential_one(config):
 
 
 def test_rejected_segments_make_the_sampler_rarer():
-    """Of segments that are never free, ever fewer are asked for; of free ones as many."""
-    worlds, q_start, _, keys = problems(16, seed=2)
-    shut = worlds._replace(radius=np.zeros_like(worlds.radius))
-    config = settings_of(method="rrt", max_expansions=100, goal_connect=0.0)
-    config = replace(config, goal_tolerance=0.0, goal_bias=0.0)
-    still = Segment(jnp.zeros((16, 8, 7)).at[..., 0].set(1e-3), jnp.full((16, 8), 0.1))
-    at_limit = np.array(q_start)
-    at_limit[:, 0] = Q_MAX  # where every such segment stands still, and is rejected
-    args = (shut, at_limit, at_limit - 1, at_limit, keys, lambda chunk: still)
-    fixed, adaptive = (
-        planner(replace(config, adaptive_uniform=on))(*args) for on in (False, True)
-    )
-    assert np.all(adaptive.learned < 0.5 * fixed.learned)
-    assert np.all(adaptive.learned > 0)
+    """All kept: the fixed mixture. None of nine kept: a tenth of it, and never nothing."""
+    config = replace(PAPER_PLANNER, p_uniform=0.2)
+    keys = jax.random.split(jax.random.key(0), 3)
+    expansion = jnp.tile(jnp.arange(4000), (3, 1))
+    limits = jnp.full(7, -Q_MAX), jnp.full(7, Q_MAX)
+    draw = draw_numbers(keys, expansion, limits, config)
+    tried, kept = jnp.array([0, 9, 9]), jnp.array([0, 9, 0])
+    share = adapted(draw, tried, kept, config).learned.mean(axis=1)
+    np.testing.assert_allclose(share, [0.8, 0.8, 0.08], atol=0.02)
+    np.testing.assert_allclose(share[:2], draw.learned[:2].mean(axis=1), atol=1e-3)
 
 
 @pytest.fixture(scope="module", params=METHODS)
