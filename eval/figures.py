@@ -18,7 +18,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from PIL import Image
-from sheet import Key, blank, sheet
+from sheet import INK, PAPER, Key, blank, sheet
 
 from jaxplan.agent import Agent
 from jaxplan.cli import run_script
@@ -186,8 +186,12 @@ def figure5(
         for row, caption, scene in zip(rows, captions, chosen, strict=True):
             nodes = _proposals(paint, agent, scene)
             moment = scene.moment._replace(proposals=paint.dots(nodes), seen=None)
-            row.append(paint.picture(moment))
-            share = np.mean(_distance(paint, nodes, scene) < NEAR)
+            way = _way(paint, scene)
+            targets = [mark.position for mark in moment.targets]
+            row.append(paint.picture(moment, around=np.array([*way, *targets])))
+            ends = np.array([mark.position for mark in moment.proposals])
+            gaps = np.linalg.norm(ends[:, None] - way, axis=-1).min(1)
+            share = np.mean(gaps < NEAR)
             caption.append(
                 f"before the {TOGGLES[scene.stage]}: {share:.0%} within "
                 f"{100 * NEAR:.0f} cm of the way taken"
@@ -207,12 +211,13 @@ def legend() -> list[Key]:
 
 
 def small(page: Image.Image) -> Image.Image:
-    """The page in 256 colours, those of the marks among them: a third of the size."""
-    marks = [c for color in painter.MARKS for c in color]
-    common = 256 - len(painter.MARKS)
-    palette = page.quantize(common).getpalette() or []
+    """The page in 256 colours, those of paper and marks among them: a third of the size."""
+    kept = (PAPER, INK, *painter.MARKS)
+    common = 256 - len(kept)
+    palette = (page.quantize(common).getpalette() or [])[: 3 * common]
+    palette += [0] * (3 * common - len(palette))
     colors = Image.new("P", (1, 1))
-    colors.putpalette(palette[: 3 * common] + marks)
+    colors.putpalette(palette + [c for color in kept for c in color])
     return page.quantize(palette=colors, dither=Image.Dither.NONE)
 
 
@@ -238,11 +243,10 @@ def _proposals(paint: Painter, agent: Agent, scene: Scene) -> np.ndarray:
     return paint.proposed(phase, scene.episode, segments, bases=8, each=24)
 
 
-def _distance(paint: Painter, nodes: np.ndarray, scene: Scene) -> np.ndarray:
-    """(N,) from the tool centre points of nodes to those of the executed motion [m]."""
-    way = np.stack([paint.tcp(q) for q in scene.phase.motion.q[scene.episode][::2]])
-    ends = np.stack([paint.tcp(q) for q in nodes])
-    return np.linalg.norm(ends[:, None] - way, axis=-1).min(1)
+def _way(paint: Painter, scene: Scene) -> np.ndarray:
+    """(N, 3) where the executed motion brings the tool centre point [m]."""
+    motion = scene.phase.motion.q[scene.episode]
+    return np.stack([paint.tcp(q) for q in motion[::2]])
 
 
 if __name__ == "__main__":

@@ -106,8 +106,13 @@ class Painter:
         """Where proposed nodes (N, 7) [rad] bring the tool centre point."""
         return tuple(Mark(self.tcp(q), "dot", PROPOSAL) for q in nodes)
 
-    def picture(self, moment: Moment) -> Image.Image:
-        """Renders a moment, with what the hand's camera saw in its lower right corner."""
+    def picture(self, moment: Moment, around: np.ndarray | None = None) -> Image.Image:
+        """Renders a moment, with what the hand's camera saw in its lower right corner.
+
+        Args:
+            moment: What is drawn.
+            around: Points (N, 3) [m]; only the part of the picture about them is shown.
+        """
         self._data.qpos[:] = moment.qpos
         mujoco.mj_forward(self._model, self._data)
         picture = Image.fromarray(self._camera.render(self._data, self._view))
@@ -115,6 +120,8 @@ class Painter:
         if marks:
             places = self._camera.project(np.array([m.position for m in marks]))
             picture = _marked(picture, marks, places, self._scale)
+        if around is not None:
+            picture = picture.crop(_window(self._camera.project(around), picture.size))
         if moment.seen is not None:
             width = round(INSET * picture.width)
             height = width * moment.seen.shape[0] // moment.seen.shape[1]
@@ -148,6 +155,18 @@ def _marked(
                 draw.line((x - r, y, x + r, y), (*color, 255), width)
                 draw.line((x, y - r, x, y + r), (*color, 255), width)
     return Image.alpha_composite(picture.convert("RGBA"), over).convert("RGB")
+
+
+def _window(places: np.ndarray, size: tuple[int, int]) -> tuple[int, int, int, int]:
+    """Left, top, right and bottom of the part about pixels (N, 2), in the picture's shape."""
+    low, high = places.min(0), places.max(0)
+    room = np.maximum(0.12 * np.array(size), 0.3 * (high - low))
+    share = max(0.4, *((high - low + 2 * room) / size))
+    half = min(share, 1.0) * np.array(size) / 2
+    middle = np.clip((low + high) / 2, half, size - half)
+    left, top = (middle - half).round().astype(int)
+    right, bottom = (middle + half).round().astype(int)
+    return int(left), int(top), int(right), int(bottom)
 
 
 def _near() -> mujoco.MjvCamera:
