@@ -132,17 +132,20 @@ def shipped(directory: Path) -> tuple[dict[str, Weights], list[str]]:
 def side(
     name: str, weights: Weights, features: int, problems: int, segments: int
 ) -> Side:
-    """One call of a sampler, condition network included, for conditions of zeros."""
+    """One call of a sampler, condition network included, for conditions of zeros.
+
+    The weights are part of the program, as in `jaxplan.agent`.
+    """
     config = weights.config
     joints = jnp.zeros((problems, len(config.q_min)))
     mode = jnp.zeros(problems, jnp.int32)
     cond = Cond(jnp.zeros((problems, features)), joints, mode, joints, mode, joints)
     keys = jax.random.split(jax.random.key(0), problems)
 
-    def call(params: dict, cond: Cond, keys: jax.Array) -> Any:
-        return draw(config, params, cond, keys, segments)
+    def call(cond: Cond, keys: jax.Array) -> Any:
+        return draw(config, weights.params, cond, keys, segments)
 
-    program, seconds = compiled(call, weights.params, cond, keys, options={})
+    program, seconds = compiled(call, cond, keys, options={})
     return Side(name, program, problems * segments, seconds)
 
 

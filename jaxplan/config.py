@@ -200,6 +200,9 @@ class SegmentConfig:
     tree_context: bool = False
     """A segment comes with the node at which it is meant to begin, and a search takes from its
     bank one that fits its base."""
+    temperature: float = 1.0
+    """Factor on the noise that segments are drawn from; training does not look at it. Below 1
+    they keep to what is typical: more precise, less diverse."""
     step_min: float = 0.05
     step_max: float = 0.2
     """s in [step_min, step_max] [rad]."""

@@ -90,10 +90,19 @@ def test_without_velocity_a_few_steps_only_scale_the_noise(count):
     )
     params = init(config, jax.random.key(0), (12,))
     keys = jax.random.split(jax.random.key(2), 3)
-    x_T = noise(keys, 5, 8)[..., :7]
+    x_T = noise(config, keys, 5, 8)[..., :7]
     segment = draw(config, params, condition(3), keys, 5)
     expected = x_T / jnp.linalg.norm(x_T, axis=-1, keepdims=True)
     np.testing.assert_allclose(segment.direction, expected, atol=2e-5)
+
+
+@pytest.mark.parametrize("config", CONFIGS[1:], ids=name_of)
+def test_without_temperature_all_segments_are_one(config):
+    config = replace(config, temperature=0.0)
+    keys = jax.random.split(jax.random.key(2), 3)
+    segment = draw(config, weights(config), condition(3), keys, 5)
+    np.testing.assert_allclose(np.ptp(segment.direction, axis=1), 0, atol=1e-6)
+    assert np.ptp(segment.direction, axis=0).max() > 1e-3, "the condition is not heard"
 
 
 def test_few_steps_part_the_teachers_way():

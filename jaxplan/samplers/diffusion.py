@@ -19,7 +19,7 @@ def draw(
     steps = diffusion.timesteps(config.num_train_timesteps, config.num_inference_steps)
     x_0 = diffusion.ddim(
         denoiser(config, params, cond, steps),
-        noise(keys, n, config.size),
+        noise(config, keys, n, config.size),
         config.num_train_timesteps,
         steps,
         clip=diffusion.bounds(len(config.q_min), config.tree_context),
@@ -48,9 +48,10 @@ def denoiser(
     return denoise
 
 
-def noise(keys: jax.Array, n: int, size: int) -> jax.Array:
-    """Standard normal numbers [P, n, size] of the problems with keys [P]."""
-    return jax.vmap(lambda key: jax.random.normal(key, (n, size)))(keys)
+def noise(config: SegmentConfig, keys: jax.Array, n: int, size: int) -> jax.Array:
+    """Normal numbers [P, n, size] of the problems with keys [P], at the temperature."""
+    normal = jax.vmap(lambda key: jax.random.normal(key, (n, size)))(keys)
+    return config.temperature * normal
 
 
 def segments(config: SegmentConfig, x_0: jax.Array, cond: Cond) -> Segment:

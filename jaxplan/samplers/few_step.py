@@ -33,7 +33,7 @@ def draw(
 
     x_0 = diffusion.ddim(
         denoise,
-        noise(keys, n, config.size),
+        noise(config, keys, n, config.size),
         config.num_train_timesteps,
         steps,
         clip=diffusion.bounds(len(config.q_min), config.tree_context),

@@ -13,8 +13,8 @@ from jaxplan.samplers.diffusion import noise, segments
 def draw(
     config: CvaeConfig | GanConfig, params: dict, cond: Cond, keys: jax.Array, n: int
 ) -> Segment:
-    """`n` segments for each of P problems; see `samplers.draw`. z is standard normal."""
+    """`n` segments for each of P problems; see `samplers.draw`. z is normal."""
     model: Any = network(config)
     vector = model.apply(params, cond, method="cond")[:, None]
-    z = noise(keys, n, config.latent)
+    z = noise(config, keys, n, config.latent)
     return segments(config, model.apply(params, z, vector, method="generate"), cond)
