@@ -69,7 +69,7 @@ def main(args: Args) -> None:
     count = min(args.proposals, 50) if args.quick else args.proposals
     samplers, notes = shipped(args.weights)
     upper = load_weights("predictor", args.weights)
-    features = upper.config.encoder.features
+    features = upper.config.encoder.features * (1 + upper.config.encoder.average)
     large = SamplerConfig(encoder=None)
     network = Weights(
         large, jax.jit(partial(init, large, image=(features,)))(jax.random.key(0)), {}
