@@ -2,6 +2,7 @@
 
 import ctypes.util
 import json
+import shutil
 import sys
 from pathlib import Path
 
@@ -11,8 +12,7 @@ import numpy as np
 import pytest
 
 from jaxplan.cli import main
-from jaxplan.config import PredictorConfig
-from jaxplan.learning.pretrained import save_weights
+from jaxplan.learning.pretrained import DIRECTORY
 
 ARM = Path(__file__).parents[1] / "docs" / "arm.xml"
 
@@ -62,8 +62,9 @@ def test_missing_weights_are_named(refused, tmp_path):
 
 
 def test_damaged_weights_are_named(refused, tmp_path):
-    params = {"kernel": np.zeros((3, 4), np.float32)}
-    path = save_weights(tmp_path, "predictor", params, PredictorConfig(), {})
+    for name in ("manifest.json", "predictor.npz"):
+        shutil.copy(DIRECTORY / name, tmp_path)
+    path = tmp_path / "predictor.npz"
     content = bytearray(path.read_bytes())
     content[len(content) // 2] ^= 1
     path.write_bytes(content)
