@@ -5,6 +5,7 @@ import json
 import shutil
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import imageio.v3 as iio
 import jax
@@ -81,7 +82,8 @@ def test_without_gl_it_says_what_to_install(refused, monkeypatch):
         def __init__(self, *_):
             self.predict = self.propose = None
 
-    monkeypatch.setattr("jaxplan.learning.load_pair", lambda _: (None, None))
+    weights = SimpleNamespace(check_task=lambda task: None)
+    monkeypatch.setattr("jaxplan.learning.load_pair", lambda _: (weights, weights))
     monkeypatch.setattr("jaxplan.evaluation.success.Agent", Blind)
     monkeypatch.delenv("MUJOCO_GL", raising=False)
     monkeypatch.delenv("DISPLAY", raising=False)
