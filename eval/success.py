@@ -1,4 +1,7 @@
-"""Success over seeds: `python eval/success.py --seeds 100000:100100 --out success.json`."""
+"""Success over seeds: `python eval/success.py --seeds 100000:100100 --out success.json`.
+
+A killed run goes on after the batches that it has finished (`runs/pieces`).
+"""
 
 import json
 from dataclasses import dataclass
@@ -8,6 +11,7 @@ from tqdm import tqdm
 
 from jaxplan.cli import run_script
 from jaxplan.evaluation import Success, evaluate, parse_seeds
+from jaxplan.evaluation.memo import Memo
 from jaxplan.learning import load_pair
 from jaxplan.learning.pretrained import DIRECTORY
 
@@ -32,7 +36,7 @@ def main(args: Args) -> None:
     weights = load_pair(args.weights)
     args.out.parent.mkdir(parents=True, exist_ok=True)
     with tqdm(total=len(seeds), unit="episode") as bar:
-        result = evaluate(seeds, weights, args.study, bar.update)
+        result = evaluate(seeds, weights, args.study, bar.update, Memo())
     if not args.phases:
         for episode in result["episodes"]:
             del episode["phases"]

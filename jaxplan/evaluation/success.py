@@ -3,12 +3,14 @@
 import dataclasses
 import time
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 
 from jaxplan.agent import Agent
 from jaxplan.config import PAPER_PLANNER, PlannerConfig, RolloutConfig, TrajectoryConfig
+from jaxplan.evaluation.memo import Memo, code_digest
 from jaxplan.evaluation.statistics import wilson
-from jaxplan.evaluation.toggle_error import ToggleErrors
+from jaxplan.evaluation.toggle_error import ToggleError, ToggleErrors, summarize
 from jaxplan.learning import Weights
 from jaxplan.motion import MotionPlanner
 from jaxplan.provenance import versions
@@ -71,6 +73,7 @@ class Study:
         progress: Callable[[int], object] = lambda done: None,
         predict: Predict | None = None,
         listen: Callable[[Phase], None] | None = None,
+        memo: Memo | None = None,
     ) -> dict[str, Any]:
         """Runs one episode per seed.
 
@@ -79,28 +82,53 @@ class Study:
             progress: Called with the number of episodes of each finished batch.
             predict: Takes the place of the agent's `predict` (ablations).
             listen: Called once a round, beside the toggle errors.
+            memo: Keeps finished batches, so that a killed run goes on after them. Not
+                together with `predict` and `listen`, of which it knows nothing.
 
         Returns:
             JSON-ready: success_rate, wilson_95, episodes, toggle_error, config, versions.
         """
-        errors = ToggleErrors(self.task)
+        assert memo is None or (predict is None and listen is None)
+        measured = ToggleErrors(self.task)
 
         def heard(phase: Phase) -> None:
-            errors(phase)
+            measured(phase)
             if listen is not None:
                 listen(phase)
 
-        start = time.perf_counter()
-        records: list[EpisodeRecord] = []
+        def piece(part: Sequence[int]) -> dict[str, Any]:
+            start = time.perf_counter()
+            records = self._rollout(part, self.config.rollout, predict, heard)
+            seconds = time.perf_counter() - start
+            episodes = [episode_json(record) for record in records]
+            return {
+                "episodes": episodes,
+                "errors": measured.finish(),
+                "seconds": seconds,
+            }
+
+        pieces = []
         for first in range(0, len(seeds), self.config.batch):
-            part = seeds[first : first + self.config.batch]
-            records += self._rollout(part, self.config.rollout, predict, heard)
-            errors.finish()
+            part = list(seeds[first : first + self.config.batch])
+            if memo is None:
+                pieces.append(piece(part))
+            else:
+                pieces.append(memo(self._settings(part), partial(piece, part)))
             progress(len(part))
-        seconds = time.perf_counter() - start
-        return self._result(records) | {
-            "toggle_error": errors.summary(),
-            "seconds": seconds,
+        episodes = [episode for piece in pieces for episode in piece["episodes"]]
+        errors = [ToggleError(*row) for piece in pieces for row in piece["errors"]]
+        return self._result(episodes) | {
+            "toggle_error": summarize(errors),
+            "seconds": sum(piece["seconds"] for piece in pieces),
+        }
+
+    def _settings(self, seeds: Sequence[int]) -> dict[str, Any]:
+        """All that decides how these episodes go."""
+        return {
+            "study": dataclasses.asdict(self.config),
+            "weights": [network.info.get("sha256") for network in self._weights],
+            "seeds": [int(seed) for seed in seeds],
+            "code": code_digest(("",)),
         }
 
     def _rollout(
@@ -121,19 +149,19 @@ class Study:
             listen,
         )
 
-    def _result(self, records: list[EpisodeRecord]) -> dict[str, Any]:
-        successes = sum(record.success for record in records)
-        phases = [phase for record in records for phase in record.phases]
+    def _result(self, episodes: list[dict[str, Any]]) -> dict[str, Any]:
+        successes = sum(episode["success"] for episode in episodes)
+        phases = [phase for episode in episodes for phase in episode["phases"]]
         return {
-            "success_rate": successes / len(records),
-            "wilson_95": list(wilson(successes, len(records))),
+            "success_rate": successes / len(episodes),
+            "wilson_95": list(wilson(successes, len(episodes))),
             "successes": successes,
-            "trials": len(records),
+            "trials": len(episodes),
             "expansions_per_success": _mean(
-                [record.expansions for record in records if record.success]
+                [e["expansions"] for e in episodes if e["success"]]
             ),
-            "phases_solved": _mean([phase.status == "SOLVED" for phase in phases]),
-            "episodes": [episode_json(record) for record in records],
+            "phases_solved": _mean([phase["status"] == "SOLVED" for phase in phases]),
+            "episodes": episodes,
             "weights": {
                 name: network.info.get("sha256")
                 for name, network in zip(
@@ -150,10 +178,12 @@ def evaluate(
     weights: tuple[Weights, Weights],
     config: Success = Success(),
     progress: Callable[[int], object] = lambda done: None,
+    memo: Memo | None = None,
 ) -> dict[str, Any]:
     """Runs one episode per seed; see `Study.run`."""
     batch = min(config.batch, len(seeds))
-    return Study(weights, dataclasses.replace(config, batch=batch)).run(seeds, progress)
+    study = Study(weights, dataclasses.replace(config, batch=batch))
+    return study.run(seeds, progress, memo=memo)
 
 
 def episode_json(record: EpisodeRecord) -> dict[str, Any]:

@@ -38,7 +38,6 @@ class ToggleErrors:
     def __init__(self, task: MugTask) -> None:
         self._task, self._expert = task, Expert(task.model, task.shape)
         self._predictions: list[_Prediction] = []
-        self._errors: list[ToggleError] = []
 
     def __call__(self, phase: Phase) -> None:
         """Keeps a round's predictions."""
@@ -54,22 +53,18 @@ class ToggleErrors:
                 _Prediction(e, int(keyframes.toggle), predicted, keyframes.q[-1])
             )
 
-    def finish(self) -> None:
-        """Ends a batch: its episodes' toggles are now all known."""
+    def finish(self) -> list[ToggleError]:
+        """Ends a batch, whose episodes' toggles are now all known; its errors."""
         truth: dict[int, list[np.ndarray]] = {}
         for p in self._predictions:
             truth.setdefault(p.episode, []).append(p.expert)
+        errors = []
         for p in self._predictions:
             error = np.linalg.norm(p.predicted - p.expert)
             distances = np.linalg.norm(np.array(truth[p.episode]) - p.predicted, axis=1)
-            self._errors.append(
-                ToggleError(p.toggle, float(error), float(distances.min()))
-            )
+            errors.append(ToggleError(p.toggle, float(error), float(distances.min())))
         self._predictions = []
-
-    def summary(self) -> dict[str, Any]:
-        """Of all finished batches; see `summarize`."""
-        return summarize(self._errors)
+        return errors
 
 
 def summarize(errors: Sequence[ToggleError]) -> dict[str, Any]:
