@@ -27,6 +27,13 @@ class PlannerConfig:
     adaptive_uniform: bool = False
     """The share of learned proposals, 1 - p_uniform, shrinks with the share of them that were
     rejected so far in the search."""
+    tree_context: bool = True
+    """A learned segment that says where it begins is taken from the node nearest to its end,
+    straight at that end, and followed there. Off: from the node nearest to q_goal, along its
+    direction, as in Algorithm 1."""
+    greedy: bool = False
+    """Samples of a uniform or goal-biased proposal are followed too, and not stepped toward once;
+    in RRT-Connect this is RRT-ConCon."""
     uniform_mode: Literal["toward", "independent"] = "toward"
     """`toward`: the uniform move goes from the nearest node toward q_rand (classical RRT).
     `independent`: its direction is drawn apart from q_rand, as the paper's UniformSegment."""
@@ -198,8 +205,7 @@ class SegmentConfig:
     relative: bool = False
     """Adds q_toggle - q_curr and q_goal - q_curr [rad] to the condition's input."""
     tree_context: bool = False
-    """A segment comes with the node at which it is meant to begin, and a search takes from its
-    bank one that fits its base."""
+    """A segment comes with the configuration at which it is meant to begin."""
     temperature: float = 1.0
     """Factor on the noise that segments are drawn from; training does not look at it. Below 1
     they keep to what is typical: more precise, less diverse."""

@@ -58,13 +58,16 @@ def problems(count, d=7, spheres=12, seed=0):
     return worlds, q_start.astype(np.float32), q_goal.astype(np.float32), keys
 
 
-def noisy_sampler(q_start, q_goal, keys, rows=8):
-    """Segments roughly from start to goal; segment j depends on the key and j alone."""
-    return lambda chunk: _noisy_segments(q_start, q_goal, keys, chunk, rows)
+def noisy_sampler(q_start, q_goal, keys, rows=8, based=False):
+    """Segments roughly from start to goal; segment j depends on the key and j alone.
+
+    With `based` they say that they begin beside the straight motion.
+    """
+    return lambda chunk: _noisy_segments(q_start, q_goal, keys, chunk, rows, based)
 
 
-@partial(jax.jit, static_argnums=4)
-def _noisy_segments(q_start, q_goal, keys, chunk, rows):
+@partial(jax.jit, static_argnums=(4, 5))
+def _noisy_segments(q_start, q_goal, keys, chunk, rows, based):
     d = q_start.shape[1]
 
     def one(key, j):
@@ -75,8 +78,12 @@ def _noisy_segments(q_start, q_goal, keys, chunk, rows):
     noise = jax.vmap(jax.vmap(one, (None, 0)))(keys, index)
     gap = q_goal - q_start
     straight = gap / jnp.linalg.norm(gap, axis=-1, keepdims=True)
+    share = jnp.abs(noise[..., 1:2])
+    base = q_start[:, None] + share * gap[:, None] + 0.3 * noise[..., 1:]
     return Segment(
-        straight[:, None] + 0.5 * noise[..., 1:], 0.15 + 0.15 * noise[..., 0]
+        straight[:, None] + 0.5 * noise[..., 1:],
+        0.15 + 0.15 * noise[..., 0],
+        base if based else None,
     )
 
 
@@ -136,7 +143,11 @@ class Oracle:
         return len(self.q) - 1, reached
 
     def expand(self, side, goal):
-        """Lines 8 to 20 of Algorithm 1 in tree `side`; returns the new node or None."""
+        """Lines 8 to 20 of Algorithm 1 in tree `side`.
+
+        Returns:
+            The new node or None, and where to follow a segment from there, or None.
+        """
         config, k = self.config, len(self.flags)
         draw = jax.tree.map(lambda x: x[k], self.draws)
         learns = side == 0 or config.goal_tree == "mirrored"
@@ -150,17 +161,24 @@ class Oracle:
             self.used += 1
             if np.isfinite(u).all() and np.isfinite(s) and np.linalg.norm(u) > 1e-6:
                 u = (u if side == 0 else -u) / np.linalg.norm(u)
+                target, direction, end = goal, u, None
+                if self.segments.base is not None:
+                    begin = np.asarray(self.segments.base[self.used - 1])
+                    end = begin + s * u if side == 0 else begin
+                    target, direction = end, None
                 s = np.clip(s, config.step_min, config.step_max)
-                base = self.nearest(goal, side, tie_break=config.toggle_tie_break > 0)
-                node = self.move(base, side, goal, s, u)[0]
+                base = self.nearest(target, side, config.toggle_tie_break > 0)
+                node, reached = self.move(base, side, target, s, direction)
                 self.tried, self.kept = self.tried + 1, self.kept + (node is not None)
-                return node
+                return node, None if reached else end
         length, direction = draw.segment.length, None
         target = goal if draw.goal else draw.q_rand
         if not draw.goal and config.uniform_mode == "independent":
             direction = draw.segment.direction
         base = self.nearest(target, side)
-        return self.move(base, side, target, length, direction)[0]
+        node, reached = self.move(base, side, target, length, direction)
+        onward = config.greedy and direction is None and not reached
+        return node, target if onward else None
 
     def left(self):
         return len(self.flags) < self.config.max_expansions
@@ -175,18 +193,23 @@ class Oracle:
         return False
 
     def rrt(self):
-        config, node = self.config, 0
+        config, node, end = self.config, 0, None
         while True:
             if node is not None:
                 gap = self.d(self.q[node], self.q_goal)
                 if 0 < gap <= config.goal_connect and self.left():
                     self.chain(node, 0, self.q_goal)
+                    end = None
                 best = self.q[self.nearest(self.q_goal, 0)]
                 if self.d(best, self.q_goal) <= config.goal_tolerance:
                     return True
             if not self.left():
                 return False
-            node = self.expand(0, self.q_goal)
+            if node is not None and end is not None:
+                node, reached = self.move(node, 0, end, config.step_max)
+                end = None if reached else end
+            else:
+                node, end = self.expand(0, self.q_goal)
 
     def rrt_connect(self):
         self.q.append(self.q_goal)
@@ -196,7 +219,12 @@ class Oracle:
             return True
         side, ends = 0, (self.q_start, self.q_goal)
         while self.left():
-            node = self.expand(side, ends[1 - side])
+            node, end = self.expand(side, ends[1 - side])
+            newest = node
+            while newest is not None and end is not None and self.left():
+                newest, reached = self.move(newest, side, end, self.config.step_max)
+                node = node if newest is None else newest
+                end = None if reached else end
             if node is not None and self.chain(None, 1 - side, self.q[node]):
                 return True
             side = 1 - side

@@ -239,25 +239,31 @@ ORACLE_CONFIGS = {
         toggle_tie_break=0.2,
         p_uniform=0.6,
     ),
+    "rrt, with bases": settings_of(method="rrt"),
+    "rrt_connect, with bases": settings_of(),
+    "rrt_connect, with bases, other settings": settings_of(
+        goal_tree="uniform", toggle_tie_break=0.2, adaptive_uniform=True
+    ),
+    "rrt, greedy": settings_of(method="rrt", greedy=True),
+    "rrt_connect, with bases, greedy": settings_of(greedy=True, p_uniform=0.5),
     "rrt, adaptive": settings_of(method="rrt", adaptive_uniform=True),
     "rrt_connect, adaptive": settings_of(adaptive_uniform=True),
 }
 
 
-@pytest.mark.parametrize("config", ORACLE_CONFIGS.values(), ids=ORACLE_CONFIGS.keys())
-def test_batched_search_is_the_sequential_one(config):
+@pytest.mark.parametrize("name", ORACLE_CONFIGS)
+def test_batched_search_is_the_sequential_one(name):
     """A plain NumPy planner, fed the same random numbers, grows the same trees."""
-    config = replace(config, max_expansions=100)
+    config = replace(ORACLE_CONFIGS[name], max_expansions=100)
     count = 24
     worlds, q_start, q_goal, keys = problems(count, seed=2)
     q_toggle = q_goal + 0.3
-    draw = noisy_sampler(q_start, q_goal, keys)
+    draw = noisy_sampler(q_start, q_goal, keys, based="with bases" in name)
     result, tree = searched_trees(config, worlds, q_start, q_goal, q_toggle, keys, draw)
     chunks = [draw(jnp.full(count, c)) for c in range(100 // 8 + 1)]
     for p in range(count):
-        segments = Segment(
-            jnp.concatenate([c.direction[p] for c in chunks]),
-            jnp.concatenate([c.length[p] for c in chunks]),
+        segments = jax.tree.map(
+            lambda *c, p=p: jnp.concatenate([x[p] for x in c]), *chunks
         )
         world = Spheres(worlds.centre[p], worlds.radius[p])
         oracle = Oracle(

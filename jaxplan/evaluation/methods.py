@@ -5,6 +5,8 @@ differ in where proposals come from, and in nothing else.
 """
 
 import dataclasses
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from jaxplan.config import PAPER_PLANNER, PlannerConfig
@@ -16,8 +18,8 @@ class Method(NamedTuple):
     name: str
     weights: str | None = None
     """Of the learned sampler (`load_weights`); None = uniform proposals."""
-    goal_bias: float | None = None
-    """Of the uniform proposals; None = the backbone's."""
+    changes: Mapping[str, Any] = MappingProxyType({})
+    """To the backbone's settings."""
     paper: float | None = None
     """Expansions normalised to ours, Table 2."""
 
@@ -35,13 +37,15 @@ class Backbone(NamedTuple):
 OURS = "ours (diffusion, DDIM-25)"
 METHODS = (
     Method(OURS, "sampler", paper=1.0),
+    Method("ours without tree context", "sampler", {"tree_context": False}),
     Method("few-step", "few_step"),
     Method("CVAE", "cvae", paper=1.36),
     Method("conditional GAN", "gan", paper=1.67),
-    Method("uniform, no goal bias", None, 0.0, 2.75),
-    Method("uniform, 5 % goal bias", None, 0.05, 2.75),
-    Method("goal-biased 0.5", None, 0.5, 1.73),
-    Method("goal-biased 0.8", None, 0.8),
+    Method("uniform, no goal bias", None, {"goal_bias": 0.0}, 2.75),
+    Method("uniform, 5 % goal bias", None, {"goal_bias": 0.05}, 2.75),
+    Method("uniform, greedy", None, {"goal_bias": 0.05, "greedy": True}),
+    Method("goal-biased 0.5", None, {"goal_bias": 0.5}, 1.73),
+    Method("goal-biased 0.8", None, {"goal_bias": 0.8}),
 )
 BACKBONES = (
     Backbone(
@@ -62,9 +66,11 @@ BACKBONES = (
             "goal_connect": 0.0,
             "goal_bias": 0.0,
             "uniform_mode": "independent",
+            "tree_context": False,
         },
         "Algorithm 1 to the letter: one tree, no straight motion to the goal, uniform "
-        "segments whose direction is independent of the sample. 100 trials.",
+        "segments whose direction is independent of the sample, learned ones taken from the "
+        "node nearest to the goal, wherever they were meant to begin. 100 trials.",
         100,
     ),
 )
@@ -77,6 +83,5 @@ def planner(backbone: Backbone, method: Method, **changes: Any) -> PlannerConfig
         # A classical baseline steers toward its sample: the letter's uniform segments
         # are part of the mixture.
         settings |= {"p_uniform": 1.0, "uniform_mode": "toward"}
-    if method.goal_bias is not None:
-        settings["goal_bias"] = method.goal_bias
+    settings |= method.changes
     return dataclasses.replace(PAPER_PLANNER, **(settings | changes))

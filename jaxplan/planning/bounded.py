@@ -86,7 +86,7 @@ def admits(
     """
     _, other = _roots(query, control.side)
     rest = jnp.linalg.norm(q_new - other, axis=-1)
-    meets = control.connecting & reached
+    meets = control.connecting & ~control.following & reached
     rest = jnp.where(meets, at(tree.cost, control.aim), rest)
     return cost + rest < query.bound[:, None]
 

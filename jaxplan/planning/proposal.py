@@ -85,7 +85,8 @@ def mixture(
     """Chooses the proposal of one expansion (Algorithm 1, lines 8 to 15).
 
     A learned segment that is no move (not finite, no direction) gives way to the uniform
-    proposal of the same expansion, so a broken sampler leaves plain RRT.
+    proposal of the same expansion, so a broken sampler leaves plain RRT. One that says
+    where it begins is a move to its end.
 
     Args:
         draw: The expansion's random numbers.
@@ -103,10 +104,15 @@ def mixture(
     norm = jnp.linalg.norm(segment.direction, axis=-1, keepdims=True)
     length = jnp.clip(segment.length, config.step_min, config.step_max)
     at_goal, row = (learned | to_goal)[..., None], learned[..., None]
+    based = segment.base is not None
     proposal = Proposal(
-        target=jnp.where(at_goal, q_goal, draw.q_rand),
+        target=jnp.where(
+            row,
+            segment.end if based else q_goal,
+            jnp.where(at_goal, q_goal, draw.q_rand),
+        ),
         direction=jnp.where(row, segment.direction / norm, draw.segment.direction),
         length=jnp.where(learned, length, draw.segment.length),
-        toward=~learned & (to_goal | (config.uniform_mode == "toward")),
+        toward=jnp.where(learned, based, to_goal | (config.uniform_mode == "toward")),
     )
     return proposal, learned

@@ -1,6 +1,8 @@
 """RRT as in Algorithm 1, with the goal-connect rule as a switch; what one worker does.
 
 grow:     a proposal of the mixture; accepted within `goal_connect` of q_goal -> connect
+follow:   straight steps on to the end of a learned segment that has a base, or to any
+          sample if `greedy`; there or blocked -> grow
 connect:  straight steps from the newest node to q_goal; blocked -> grow
 solved:   a node within `goal_tolerance` of q_goal and nothing left to connect
 """
@@ -27,7 +29,9 @@ def begin(query: Query, config: PlannerConfig) -> Control:
     gap = distance(query.q_start, query.q_goal, config.metric)[:, None]
     connecting = first & (gap > 0) & (gap <= config.goal_connect)
     solved = first & ~connecting & (gap <= config.goal_tolerance)
-    return Control(zero, connecting, connecting, zero, zero, solved)
+    no = jnp.zeros(shape, bool)
+    q_aim = jnp.broadcast_to(query.q_goal[:, None], (*shape, query.q_goal.shape[-1]))
+    return Control(zero, connecting, no, connecting, zero, zero, q_aim, solved)
 
 
 def asks(control: Control, draw: Draw, config: PlannerConfig) -> jax.Array:
@@ -36,26 +40,18 @@ def asks(control: Control, draw: Draw, config: PlannerConfig) -> jax.Array:
     return ~control.connecting & draw.learned
 
 
-def towards(control: Control, query: Query) -> jax.Array:
-    """`[P, K, d]` the target whose nearest node is the base of a learned segment."""
-    q_goal = query.q_goal[:, None]
-    return jnp.broadcast_to(q_goal, (*control.side.shape, q_goal.shape[-1]))
-
-
 def propose(
     control: Control,
-    tree: Tree,
     draw: Draw,
     asking: jax.Array,
     segment: Segment,
     query: Query,
     config: PlannerConfig,
 ) -> Move:
-    """A proposal of the mixture, or the next straight step to q_goal."""
-    del tree
+    """A proposal of the mixture, or the next straight step."""
     q_goal = query.q_goal[:, None]
     proposal, learned = mixture(draw, asking, segment, q_goal, config)
-    move = straightened(proposal, control.connecting, q_goal, config.step_max)
+    move = straightened(proposal, control.connecting, control.q_aim, config.step_max)
     return Move(move, learned)
 
 
@@ -66,14 +62,18 @@ def advance(
     ok, q_goal = outcome.accepted, query.q_goal[:, None]
     gap_new = distance(outcome.q_new, q_goal, config.metric)
     gap_base = distance(outcome.q_base, q_goal, config.metric)
-    close = control.connecting | (gap_new <= config.goal_connect)
+    was = control.connecting & ~control.following
+    close = was | (gap_new <= config.goal_connect)
     connecting = ok & close & (gap_new > 0)
+    following = ok & ~close & outcome.follows & ~outcome.reached
     # a blocked connection ends at its base, which may be near enough already
-    gap = jnp.where(ok, gap_new, jnp.where(control.connecting, gap_base, jnp.inf))
+    gap = jnp.where(ok, gap_new, jnp.where(was, gap_base, jnp.inf))
     return control._replace(
-        connecting=connecting,
-        chained=connecting,
+        connecting=connecting | following,
+        following=following,
+        chained=connecting | following,
         newest=jnp.where(ok, outcome.slot, control.newest),
+        q_aim=jnp.where(following[..., None], outcome.target, q_goal),
         solved=~connecting & (gap <= config.goal_tolerance),
     )
 

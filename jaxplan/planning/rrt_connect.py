@@ -1,6 +1,8 @@
 """RRT-Connect with segments: two trees that grow in turn and run at each other.
 
     grow:     a proposal of the mixture in tree `side`; accepted -> connect, else swap
+    follow:   straight steps on to the end of a learned segment that has a base, or to any
+              sample if `greedy`; there or blocked -> connect
     connect:  straight steps of the other tree to the new node; blocked -> that tree grows
     solved:   the two trees meet
 
@@ -16,8 +18,8 @@ import jax.numpy as jnp
 from jaxplan.config import PlannerConfig
 from jaxplan.planning.proposal import Draw, mixture
 from jaxplan.planning.segment import Segment, straightened
-from jaxplan.planning.state import Control, Move, Outcome, Query
-from jaxplan.planning.tree import Tree, configurations, nearest
+from jaxplan.planning.state import Control, Move, Outcome, Query, choose
+from jaxplan.planning.tree import Tree, nearest
 
 START, GOAL = 0, 1
 
@@ -33,7 +35,8 @@ def begin(query: Query, config: PlannerConfig) -> Control:
     zero, worker = jnp.zeros(shape, jnp.int32), jnp.arange(config.workers)
     no = jnp.zeros(shape, bool)
     side = jnp.broadcast_to((worker % 2).astype(jnp.int32), shape)
-    return Control(side, no | (worker == 0), no, zero, zero + GOAL, no)
+    q_aim = jnp.broadcast_to(query.q_goal[:, None], (*shape, query.q_goal.shape[-1]))
+    return Control(side, no | (worker == 0), no, no, zero, zero + GOAL, q_aim, no)
 
 
 def asks(control: Control, draw: Draw, config: PlannerConfig) -> jax.Array:
@@ -42,15 +45,8 @@ def asks(control: Control, draw: Draw, config: PlannerConfig) -> jax.Array:
     return ~control.connecting & draw.learned & learns
 
 
-def towards(control: Control, query: Query) -> jax.Array:
-    """`[P, K, d]` the target whose nearest node is the base of a learned segment."""
-    forward = (control.side == START)[..., None]
-    return jnp.where(forward, query.q_goal[:, None], query.q_start[:, None])
-
-
 def propose(
     control: Control,
-    tree: Tree,
     draw: Draw,
     asking: jax.Array,
     segment: Segment,
@@ -58,12 +54,11 @@ def propose(
     config: PlannerConfig,
 ) -> Move:
     """A proposal of the mixture, mirrored in the goal's tree, or the next straight step."""
-    forward = (control.side == START)[..., None]
-    direction = jnp.where(forward, segment.direction, -segment.direction)
-    segment = Segment(direction, segment.length)
-    proposal, learned = mixture(draw, asking, segment, towards(control, query), config)
-    q_aim = configurations(tree, control.aim)
-    move = straightened(proposal, control.connecting, q_aim, config.step_max)
+    forward = control.side == START
+    segment = choose(forward, segment, segment.reversed())
+    root = jnp.where(forward[..., None], query.q_goal[:, None], query.q_start[:, None])
+    proposal, learned = mixture(draw, asking, segment, root, config)
+    move = straightened(proposal, control.connecting, control.q_aim, config.step_max)
     return Move(move, learned)
 
 
@@ -72,14 +67,22 @@ def advance(
 ) -> Control:
     """What follows an accepted or a rejected move."""
     del query, config
-    ok, was = outcome.accepted, control.connecting
+    ok, was = outcome.accepted, control.connecting & ~control.following
     met = was & ok & outcome.reached
+    following = ok & outcome.follows & ~outcome.reached
+    grown = ~was & ~following & (ok | control.following)
+    newest = jnp.where(ok, outcome.slot, control.newest)
+    q_newest = jnp.where(ok[..., None], outcome.q_new, outcome.q_base)
+    q_aim = jnp.where(following[..., None], outcome.target, control.q_aim)
+    onward = was & ok & ~met
     return Control(
-        side=jnp.where(was, control.side, 1 - control.side),
-        connecting=ok & ~met,
-        chained=was & ok & ~met,
-        newest=jnp.where(ok, outcome.slot, control.newest),
-        aim=jnp.where(~was & ok, outcome.slot, control.aim),
+        side=jnp.where(was | following, control.side, 1 - control.side),
+        connecting=following | grown | onward,
+        following=following,
+        chained=following | onward,
+        newest=newest,
+        aim=jnp.where(grown, newest, control.aim),
+        q_aim=jnp.where(grown[..., None], q_newest, q_aim),
         solved=met,
     )
 

@@ -15,8 +15,6 @@ Everything about a problem depends on its own question, key and settings: neithe
 other problems of a batch nor on its place among them.
 """
 
-from typing import TypeVar
-
 import jax
 import jax.numpy as jnp
 
@@ -26,7 +24,7 @@ from jaxplan.planning.edges import ConfigFree, motions_free, points_for
 from jaxplan.planning.proposal import adapted, draw_numbers
 from jaxplan.planning.result import PlanResult, Status
 from jaxplan.planning.segment import Limits, Segment, extend
-from jaxplan.planning.state import Move, Outcome, Query, State
+from jaxplan.planning.state import Move, Outcome, Query, State, choose
 from jaxplan.planning.tree import (
     at,
     bare,
@@ -38,9 +36,7 @@ from jaxplan.planning.tree import (
     nearest,
     plant,
 )
-from jaxplan.planning.tree_context import fitting
 
-T = TypeVar("T")
 METHODS = {"rrt": rrt, "rrt_connect": rrt_connect, "ao_rrt_connect": rrt_connect}
 LIMIT_SLACK = 1e-4
 """How far a start or goal may lie outside the limits [rad]: rounding, no more."""
@@ -121,13 +117,6 @@ def start(
     )
 
 
-def choose(where: jax.Array, new: T, old: T) -> T:
-    """Rows of `new` where `where [P]`, of `old` elsewhere, in all leaves."""
-    return jax.tree.map(
-        lambda a, b: jnp.where(where.reshape(-1, *(1,) * (a.ndim - 1)), a, b), new, old
-    )
-
-
 def advance(
     state: State,
     able: jax.Array,
@@ -142,7 +131,7 @@ def advance(
         state: From `start` or an earlier round.
         able: `[P]` which problems take part.
         bank: `[P, M]` segments, M >= K, of each problem those from `state.chunk * M` on.
-            None: uniform proposals only.
+            None: uniform proposals only. Bases count with `tree_context` only.
         config_free: The check of configurations.
         limits: `(q_min [d], q_max [d])` [rad].
         config: Planner settings.
@@ -172,15 +161,14 @@ def advance(
         waiting = able & jnp.any(asking & (row >= rows), axis=1)
         running, asking = (x & ~waiting[:, None] for x in (running, asking))
         row = jnp.clip(row, 0, rows - 1)
-        if bank.base is not None:
-            target = method.towards(control, query)
-            node, _ = nearest(state.tree, control.side, target, config.metric)
-            anchor = configurations(state.tree, node)
-            backward = control.side != 0
-            row = fitting(bank, anchor, backward, query.key, number)
-        segment = Segment(at(bank.direction, row), at(bank.length, row))
+        bank = bank if config.tree_context else bank._replace(base=None)
+        segment = jax.tree.map(lambda leaf: at(leaf, row), bank)
 
-    move = method.propose(control, state.tree, draw, asking, segment, query, config)
+    move = method.propose(control, draw, asking, segment, query, config)
+    follows = jnp.where(
+        move.learned, segment.base is not None, config.greedy & move.proposal.toward
+    )
+    follows = jnp.where(control.connecting, control.following, follows)
     base, known = _base(state, move, most, config)
     base = jnp.where(control.chained, control.newest, base)
     q_base = configurations(state.tree, base)
@@ -195,9 +183,9 @@ def advance(
     free, checks = _check(config_free, q_base, q_new, running & moves, config)
     slot = state.tree.size[:, None] + jnp.cumsum(free, axis=1, dtype=jnp.int32) - 1
     tree = insert(state.tree, q_new, base, control.side, cost, slot, free)
-    outcome = Outcome(free, slot, q_base, q_new, reached)
-    after = method.advance(control, outcome, query, config)
-    after = jax.tree.map(lambda a, b: jnp.where(running, a, b), after, control)
+    target = move.proposal.target
+    outcome = Outcome(free, slot, q_base, q_new, reached, target, follows)
+    after = choose(running, method.advance(control, outcome, query, config), control)
     solved = able & jnp.any(after.solved, axis=1)
     used = state.used + jnp.sum(asking, axis=1, dtype=jnp.int32)
     chunk = state.chunk + waiting

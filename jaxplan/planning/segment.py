@@ -4,6 +4,7 @@
     classical RRT       q_rand   -           yes
     goal bias           q_goal   -           yes
     learned segment     q_goal   u           no
+      with a base       its end  -           yes
     UniformSegment      q_rand   uniform     no
 
 The base is the node nearest to `target`; the move goes `length` from it, along
@@ -32,6 +33,18 @@ class Segment(NamedTuple):
     """`[...]` [rad]."""
     base: jax.Array | None = None
     """`[..., d]` where the segment is meant to begin [rad]; None = wherever the base is."""
+
+    @property
+    def end(self) -> jax.Array:
+        """`[..., d]` where a segment with a base is meant to lead [rad]."""
+        assert self.base is not None
+        norm = jnp.linalg.norm(self.direction, axis=-1, keepdims=True)
+        return self.base + self.length[..., None] * self.direction / norm
+
+    def reversed(self) -> "Segment":
+        """The way back."""
+        base = None if self.base is None else self.end
+        return Segment(-self.direction, self.length, base)
 
 
 class Proposal(NamedTuple):
@@ -62,7 +75,10 @@ def straightened(
 def usable(segment: Segment) -> jax.Array:
     """Which segments are a move at all: finite, with a direction other than zero."""
     norm = jnp.linalg.norm(segment.direction, axis=-1)
-    return jnp.isfinite(norm) & (norm > 1e-6) & jnp.isfinite(segment.length)
+    moves = jnp.isfinite(norm) & (norm > 1e-6) & jnp.isfinite(segment.length)
+    if segment.base is None:
+        return moves
+    return moves & jnp.all(jnp.isfinite(segment.base), axis=-1)
 
 
 def extend(

@@ -1,13 +1,16 @@
 """What a search carries: the questions, the control of each worker, and the counters."""
 
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import jax
+import jax.numpy as jnp
 
 from jaxplan.config import PlannerConfig
 from jaxplan.planning.result import Status
 from jaxplan.planning.segment import Proposal
 from jaxplan.planning.tree import Tree
+
+T = TypeVar("T")
 
 
 class Query(NamedTuple):
@@ -26,18 +29,22 @@ class Query(NamedTuple):
 
 
 class Control(NamedTuple):
-    """Where each of the K workers of P problems stands in its algorithm; all of it discrete."""
+    """Where each of the K workers of P problems stands in its algorithm."""
 
     side: jax.Array
     """`[P, K]` the tree that moves next."""
     connecting: jax.Array
-    """`[P, K]` the next move is a straight step and not a proposal of the mixture."""
+    """`[P, K]` the next move is a straight step to `q_aim` and not a proposal of the mixture."""
+    following: jax.Array
+    """`[P, K]` the straight steps lead on to what a proposal stepped toward."""
     chained: jax.Array
     """`[P, K]` the next move starts from the worker's newest node, not from the nearest."""
     newest: jax.Array
     """`[P, K]` the node that the worker added last."""
     aim: jax.Array
-    """`[P, K]` node that RRT-Connect's straight steps lead to."""
+    """`[P, K]` node of the other tree that RRT-Connect's straight steps lead to."""
+    q_aim: jax.Array
+    """`[P, K, d]` where straight steps lead [rad]."""
     solved: jax.Array
     """`[P, K]` this worker has found the way."""
 
@@ -62,6 +69,10 @@ class Outcome(NamedTuple):
     """`[P, K, d]`."""
     reached: jax.Array
     """q_new is the target itself."""
+    target: jax.Array
+    """`[P, K, d]`."""
+    follows: jax.Array
+    """The steps go on until they are there or blocked, unless the trees are being connected."""
 
 
 class State(NamedTuple):
@@ -91,3 +102,13 @@ def searching(state: State, config: PlannerConfig) -> jax.Array:
     """`[P]` which problems still have something to do."""
     open_ = state.status == Status.BUDGET_EXHAUSTED
     return open_ & (state.expansions < config.max_expansions)
+
+
+def choose(where: jax.Array, new: T, old: T) -> T:
+    """Rows of `new` where `where [P]` or `[P, K]`, of `old` elsewhere, in all leaves."""
+
+    def leaf(a: jax.Array, b: jax.Array) -> jax.Array:
+        mask = where.reshape(where.shape + (1,) * (a.ndim - where.ndim))
+        return jnp.where(mask, a, b)
+
+    return jax.tree.map(leaf, new, old)
