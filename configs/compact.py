@@ -54,6 +54,8 @@ predictor = PredictorTraining(
     checkpoint_every=1000,
 )
 
+segment: dict[str, Any] = {"encoder": None, "relative": True, "tree_context": True}
+denoiser: dict[str, Any] = {"denoiser": "film_mlp", "hidden": (256, 256, 256)}
 common: dict[str, Any] = {
     "out": "jaxplan/pretrained",
     "steps": 10_000,
@@ -74,13 +76,7 @@ Their settings were chosen by precision and coverage on held-out episodes (`lear
 # 0.6            1.6    6.1   2.3   11.8
 # 0.4            1.3    5.8   2.5   13.3
 sampler = SamplerTraining(
-    network=SamplerConfig(
-        denoiser="film_mlp",
-        hidden=(256, 256, 256),
-        encoder=None,
-        relative=True,
-        temperature=0.6,
-    ),
+    network=SamplerConfig(**denoiser, **segment),
     optimizer=OptimizerConfig(learning_rate=1e-3),
     **common,
 )
@@ -93,7 +89,7 @@ sampler = SamplerTraining(
 # 16, 0.02             3.7    8.0     2.9   11.0
 #  3, 0.0004          56    101       9.7   22.5    Ichter's: far from its prior, z is a code
 cvae = CvaeTraining(
-    network=CvaeConfig(latent=8, encoder=None, relative=True),
+    network=CvaeConfig(latent=8, **segment),
     kl_weight=0.05,
     optimizer=OptimizerConfig(learning_rate=1e-3),
     **common,
@@ -104,12 +100,7 @@ cvae = CvaeTraining(
 # 5e-4, 0.5, 0.1, 0.02, 16           6.9   13.5   5.3   16.1
 # 1e-3, 0.5, 0.1, 0.1,   8           6.8   11.5   6.0   16.6
 gan = GanTraining(
-    network=GanConfig(
-        generator=(256, 256, 256),
-        discriminator=(256, 256),
-        encoder=None,
-        relative=True,
-    ),
+    network=GanConfig(generator=(256, 256, 256), discriminator=(256, 256), **segment),
     r1=1.0,
     instance_noise=0.1,
     optimizer=OptimizerConfig(
@@ -120,13 +111,7 @@ gan = GanTraining(
 
 # Of the diffusion sampler above; one run of the teacher gives four examples.
 few_step = FewStepTraining(
-    network=FewStepConfig(
-        denoiser="film_mlp",
-        hidden=(256, 256, 256),
-        encoder=None,
-        relative=True,
-        temperature=0.6,
-    ),
+    network=FewStepConfig(**denoiser, **segment),
     optimizer=OptimizerConfig(learning_rate=1e-3),
     **(common | {"steps": 5000, "batch_size": 128}),
 )

@@ -116,7 +116,7 @@ class TorchSampler(nn.Module):
     def __init__(self, config: SamplerConfig) -> None:
         super().__init__()
         self.config = config
-        features, outputs = config.step_features, len(config.q_min) + 1
+        features, outputs = config.step_features, config.size
         cond = features + config.cond_features
         self.step = nn.Sequential(
             nn.Linear(features, 4 * features),
