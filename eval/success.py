@@ -13,7 +13,7 @@ from jaxplan.cli import run_script
 from jaxplan.evaluation import Success, evaluate, parse_seeds
 from jaxplan.evaluation.memo import Memo
 from jaxplan.learning import load_pair
-from jaxplan.learning.pretrained import DIRECTORY
+from jaxplan.learning.pretrained import shipped
 
 
 @dataclass(frozen=True)
@@ -23,8 +23,8 @@ class Args:
     seeds: str = "100000:100100"
     """FIRST:END, END excluded. The shipped weights never saw seeds from 100000 on."""
     out: Path = Path("runs/success.json")
-    weights: Path = DIRECTORY
-    """Directory with predictor, sampler and manifest."""
+    weights: Path | None = None
+    """Directory with predictor, sampler and manifest; None = those shipped for the scene."""
     phases: bool = False
     """Keeps what each phase did: ten times the size."""
     study: Success = Success()
@@ -33,7 +33,7 @@ class Args:
 def main(args: Args) -> None:
     """Evaluates, writes JSON, prints the rate, the reasons of failure and toggle errors."""
     seeds = parse_seeds(args.seeds)
-    weights = load_pair(args.weights)
+    weights = load_pair(args.weights or shipped(args.study.variant))
     args.out.parent.mkdir(parents=True, exist_ok=True)
     with tqdm(total=len(seeds), unit="episode") as bar:
         result = evaluate(seeds, weights, args.study, bar.update, Memo())

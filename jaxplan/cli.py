@@ -6,7 +6,7 @@ import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any, Literal, NoReturn
 
 import tyro
 from tyro.conf import Positional
@@ -18,10 +18,13 @@ class Solve:
 
     seed: int
     """Of the mug's pose; training never saw seeds from 100000 on."""
+    variant: Literal["plain", "cluttered"] = "plain"
+    """Of the scene; `cluttered` has obstacles across most straight lines."""
     out: Path | None = None
     """Directory for episode.json, a video and a film strip."""
     weights: Path | None = None
-    """Directory with predictor, sampler and manifest; the package's own by default."""
+    """Directory with predictor, sampler and manifest; by default the package's own for the
+    scene."""
 
 
 @dataclass(frozen=True)
@@ -129,12 +132,14 @@ def _check(command: Check) -> int:
 def _solve(command: Solve) -> int:
     _check_seed(command.seed)
     _keep_compiled()
+    from jaxplan.evaluation import Success
     from jaxplan.learning import load_pair
-    from jaxplan.learning.pretrained import DIRECTORY
+    from jaxplan.learning.pretrained import shipped
     from jaxplan.solve import solve
 
-    weights = load_pair(command.weights or DIRECTORY)
-    episode = solve(command.seed, weights, command.out)
+    weights = load_pair(command.weights or shipped(command.variant))
+    config = Success(variant=command.variant)
+    episode = solve(command.seed, weights, command.out, config)
     return 0 if episode["success"] else 1
 
 

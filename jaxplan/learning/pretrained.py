@@ -28,7 +28,7 @@ from jaxplan.data import IMAGE_SHAPE, sha256, write_atomic, write_npz
 from jaxplan.networks import init
 
 DIRECTORY = Path(__file__).parents[1] / "pretrained"
-"""The weights that the package ships."""
+"""The weights that the package ships, those of other scenes in directories inside."""
 KINDS = {
     "predictor": PredictorConfig,
     "sampler": SamplerConfig,
@@ -41,6 +41,10 @@ MANIFEST = "manifest.json"
 
 class WeightsError(ValueError):
     """Weights are missing, damaged, or do not belong together."""
+
+
+class NoWeights(WeightsError):
+    """A directory has none of a network."""
 
 
 class Weights(NamedTuple):
@@ -63,6 +67,11 @@ class Weights(NamedTuple):
             raise WeightsError(
                 f"{self.info.get('file')} was trained for {', '.join(tasks)}, not {task}"
             )
+
+
+def shipped(variant: str = "plain") -> Path:
+    """The directory of a scene's weights."""
+    return DIRECTORY if variant == "plain" else DIRECTORY / variant
 
 
 def save_weights(
@@ -98,11 +107,11 @@ def load_weights(name: str, directory: str | os.PathLike = DIRECTORY) -> Weights
     """Reads a network's weights, checksum and shapes verified.
 
     Raises:
-        WeightsError: Missing or damaged, in one line.
+        WeightsError: Missing (`NoWeights`) or damaged, in one line.
     """
     manifest = _read_manifest(directory)
     if name not in manifest:
-        raise WeightsError(
+        raise NoWeights(
             f"no {name} in {Path(directory) / MANIFEST} (there: {', '.join(manifest)})"
         )
     info = manifest[name]
