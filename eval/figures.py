@@ -5,8 +5,8 @@
     figure4   three initialisations, a column for each of the four toggles
     figure5   the three learned samplers on the same problems, side by side
 
-Blue dots are where the nodes that the learned sampler proposes bring the tool centre point:
-its segments, begun at nodes along the path that the search found. Uniform proposals are left out.
+Blue dots are where the ends of learned segments bring the tool centre point. Uniform proposals are
+left out.
 """
 
 from collections.abc import Sequence
@@ -24,7 +24,7 @@ from jaxplan.agent import Agent
 from jaxplan.cli import run_script
 from jaxplan.evaluation import Study, Success, parse_seeds
 from jaxplan.learning import Weights, WeightsError, load_pair, load_weights
-from jaxplan.learning.pretrained import DIRECTORY
+from jaxplan.learning.pretrained import shipped
 from jaxplan.rollout import Phase
 from jaxplan.tasks.mug import painter
 from jaxplan.tasks.mug.painter import Moment, Painter
@@ -72,7 +72,6 @@ class Recorder:
 
     def __call__(self, phase: Phase) -> None:
         """Keeps a round."""
-        segments = phase.segments
         for row, e in enumerate(phase.episodes):
             before = self.scenes.setdefault(e, [])
             gripper = int(phase.observation.gripper[row])
@@ -80,8 +79,8 @@ class Recorder:
             stage += stage % 2 != gripper
             qpos = self._study.task.sim.data[e].qpos
             moment = self._paint.moment(phase, e, qpos)
-            if segments is not None:
-                nodes = self._paint.proposed(phase, e, segments, 6, 16)
+            if phase.draw is not None:
+                nodes = self._paint.proposed(phase, e, phase.draw, 96)
                 moment = moment._replace(proposals=self._paint.dots(nodes))
             before.append(Scene(phase, e, stage, moment))
 
@@ -90,8 +89,7 @@ def main(args: Args) -> None:
     """Runs the episodes, draws the figures, prints where they are."""
     seeds = parse_seeds(args.seeds)
     seeds = seeds[:2] if args.quick else seeds
-    plain = args.variant == "plain"
-    directory = args.weights or (DIRECTORY if plain else DIRECTORY / args.variant)
+    directory = args.weights or shipped(args.variant)
     weights = load_pair(directory)
     study = Study(weights, Success(batch=len(seeds), variant=args.variant))
     paint = Painter(study.task, "near", scale=2)
@@ -239,8 +237,7 @@ def _proposals(paint: Painter, agent: Agent, scene: Scene) -> np.ndarray:
     agent.predict(phase.observation, phase.episodes)
     keys = jax.vmap(jax.random.key)(jnp.arange(agent.batch))
     draw = agent.propose(phase.observation, phase.targets, phase.episodes, keys)
-    segments = draw(jnp.zeros(agent.batch, jnp.int32))
-    return paint.proposed(phase, scene.episode, segments, bases=8, each=24)
+    return paint.proposed(phase, scene.episode, draw, 192)
 
 
 def _way(paint: Painter, scene: Scene) -> np.ndarray:

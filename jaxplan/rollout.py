@@ -9,7 +9,6 @@ from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple, Protocol
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 
 from jaxplan.collision import World
@@ -148,12 +147,6 @@ class Phase(NamedTuple):
     executed: list[int]
     """Episodes that will move; the others found no way."""
 
-    @property
-    def segments(self) -> Segment | None:
-        """The first learned segments of each lane, whether or not the search needed them."""
-        lanes = len(self.motion.q)
-        return self.draw and self.draw(jnp.zeros(lanes, jnp.int32))
-
 
 Predict = Callable[[Any, list[int]], Targets]
 """(observation, episodes) -> targets of these episodes."""
@@ -278,7 +271,9 @@ def _plan(
     touching = batch.touched.copy()
     touching[running] |= last
     worlds = task.worlds(touching)
-    keys = _keys(batch.seeds, task.batch, number)
+    padded = np.zeros(task.batch, np.uint32)
+    padded[: len(batch.seeds)] = batch.seeds
+    keys = phase_keys(padded, np.full(task.batch, number))
     draw = propose and propose(observation, targets, running, keys)
     # Lanes that are not running are padding, so that nothing recompiles.
     query = np.zeros((3, task.batch, observation.q.shape[1]), np.float32)
@@ -356,13 +351,14 @@ def _merge(targets: Targets, planner: MotionPlanner, distance: float) -> Targets
     return Targets(q_toggle, np.array(targets.gripper_toggle), q_goal)
 
 
-def _keys(seeds: Sequence[int], lanes: int, number: int) -> jax.Array:
-    """A key per lane from its seed and the phase's number, whatever runs beside it."""
-    padded = np.zeros(lanes, np.uint32)
-    padded[: len(seeds)] = seeds
-    return jax.vmap(lambda seed: jax.random.fold_in(jax.random.key(seed), number))(
-        padded
-    )
+def phase_keys(seeds: np.ndarray, numbers: np.ndarray) -> jax.Array:
+    """A typed key for each phase [P], from its episode's seed and its number in the episode.
+
+    Whatever runs beside it: search and sampler get the same random numbers again.
+    """
+    return jax.vmap(
+        lambda seed, number: jax.random.fold_in(jax.random.key(seed), number)
+    )(seeds.astype(np.uint32), numbers.astype(np.int32))
 
 
 def _obstacle(planner: MotionPlanner, phase: Phase, episode: int) -> str:

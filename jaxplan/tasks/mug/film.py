@@ -31,8 +31,8 @@ class Film:
     def add_phase(self, phase) -> None:
         """A panel: the scene at the start of a `rollout.Phase`, targets and proposals drawn in."""
         moment = self._painter.moment(phase, 0, self._task.sim.data[0].qpos)
-        if (segments := phase.segments) is not None:
-            nodes = self._painter.proposed(phase, 0, segments)
+        if phase.draw is not None:
+            nodes = self._painter.proposed(phase, 0, phase.draw)
             moment = moment._replace(proposals=self._painter.dots(nodes))
         self._moments.append(moment)
 

@@ -1,7 +1,10 @@
 """Moments of an episode drawn for people: the scene, what was predicted, what was proposed."""
 
+from collections.abc import Callable
 from typing import NamedTuple
 
+import jax
+import jax.numpy as jnp
 import mujoco
 import numpy as np
 from PIL import Image, ImageDraw
@@ -78,29 +81,36 @@ class Painter:
         self,
         phase,
         episode: int,
-        segments: Segment,
-        bases: int = 4,
-        each: int = 12,
+        draw: Callable[[jax.Array], Segment],
+        count: int = 48,
     ) -> np.ndarray:
-        """Nodes that a tree would try along the path that a phase's search found.
+        """Where a tree would go by learned segments.
+
+        To their ends; those that do not say where they begin, from nodes along the path that
+        the phase's search found.
 
         Args:
             phase: A `rollout.Phase`.
             episode: Its lane.
-            segments: Learned segments of all lanes, direction (B, M, 7) and length (B, M).
-            bases: From how many of the path's nodes, evenly and the goal left out.
-            each: How many segments from each.
+            draw: Chunk numbers (B,) to segments of all lanes.
+            count: N, how many segments.
 
         Returns:
-            Configurations (bases * each, 7) [rad].
+            Configurations (N, 7) [rad].
         """
-        result = phase.motion.result
-        length = max(1, int(result.path_length[episode]))
-        at = np.linspace(0, length - 1, bases, endpoint=False).astype(int)
-        direction = np.asarray(segments.direction[episode])[:each]
-        step = np.asarray(segments.length[episode])[:each, None]
-        nodes = result.path[episode, at, None] + direction * step
-        return nodes.reshape(-1, 7).clip(*self._model.jnt_range[:7].T)
+        lanes, banks, drawn = len(phase.motion.q), [], 0
+        while drawn < count:
+            banks.append(draw(jnp.full(lanes, len(banks), jnp.int32)))
+            drawn += banks[-1].length.shape[1]
+        segment: Segment = jax.tree.map(
+            lambda *leaves: np.concatenate([x[episode] for x in leaves])[:count], *banks
+        )
+        if segment.base is None:
+            result = phase.motion.result
+            length = max(1, int(result.path_length[episode]))
+            at = np.linspace(0, length - 1, count, endpoint=False).astype(int)
+            segment = segment._replace(base=result.path[episode, at])
+        return np.asarray(segment.end).clip(*self._model.jnt_range[:7].T)
 
     def dots(self, nodes: np.ndarray) -> tuple[Mark, ...]:
         """Where proposed nodes (N, 7) [rad] bring the tool centre point."""
