@@ -45,8 +45,8 @@ class Sampler:
         def draw(n: int) -> Callable:
             @jit
             def program(cond, keys, chunk):
-                keys = jax.vmap(jax.random.fold_in)(keys, chunk)
-                return samplers.draw(config, weights.params, cond, keys, n)
+                params = weights.params
+                return samplers.draw_chunk(config, params, cond, keys, chunk, n)
 
             return program
 

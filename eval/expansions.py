@@ -122,12 +122,11 @@ def compare(backbone: Backbone, group: Group, counts: dict[str, Counts]) -> Tabl
 
 def per_toggle(backbone: Backbone, problems, counts: dict[str, Counts]) -> Table:
     """Mean expansions by the toggle that comes next; blocked phases, failures at N_rrt."""
+    every = np.ones(len(problems.toggle), bool)
     groups = [
-        Group(f"{name}{' blocked' if blocked else ''}", rows)
-        for blocked in (False, True)
+        Group(f"{name}{suffix}", some & (problems.toggle == index))
+        for suffix, some in (("", every), (" blocked", problems.blocked))
         for index, name in enumerate(TOGGLES)
-        if (rows := (problems.toggle == index) & (problems.blocked | (not blocked)))
-        is not None
     ]
     rows = []
     for name, count in counts.items():

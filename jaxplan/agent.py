@@ -19,6 +19,33 @@ BANK = 32
 """Learned segments drawn at a time for a phase; a search that uses them up gets as many more."""
 
 
+class Upper:
+    """The upper network with its weights, for batches of one size; the others are padded.
+
+    Args:
+        predictor: Weights.
+        batch: Lanes of the outer loop.
+    """
+
+    def __init__(self, predictor: Weights, batch: int) -> None:
+        self._batch = batch
+        self.features = np.zeros((batch, 0), np.float32)
+        """(B, F) of the images that were last seen; a sampler without an encoder asks for them."""
+
+        @jax.jit
+        def network(image, q, gripper):
+            return predict(predictor.config, predictor.params, image, q, gripper)
+
+        self.network = network
+
+    def __call__(self, observation, episodes: list[int]) -> Targets:
+        """Targets of the observed episodes: the outer loop's `predict`."""
+        padded = [pad(column, episodes, self._batch) for column in observation]
+        subgoal, self.features = self.network(*padded)
+        rows = (subgoal.q_toggle, subgoal.gripper_toggle, subgoal.q_goal)
+        return Targets(*(np.asarray(column)[episodes] for column in rows))
+
+
 class Agent:
     """Predictor and sampler with their weights, for batches of one size.
 
@@ -42,7 +69,7 @@ class Agent:
         inference_steps: int | None = None,
     ) -> None:
         self.batch = batch
-        self._features = np.zeros((batch, 0), np.float32)
+        self.predict = Upper(predictor, batch)
         config = sampler.config
         if inference_steps is not None:
             if not isinstance(config, SamplerConfig):
@@ -52,27 +79,12 @@ class Agent:
             config = dataclasses.replace(config, num_inference_steps=inference_steps)
         self._own_encoder = config.encoder is not None
 
-        @jax.jit
-        def upper(image, q, gripper):
-            return predict(predictor.config, predictor.params, image, q, gripper)
-
         @jit
         def segments(cond, keys, chunk):
-            keys = jax.vmap(jax.random.fold_in)(keys, chunk)
-            return samplers.draw(config, sampler.params, cond, keys, BANK)
+            params = sampler.params
+            return samplers.draw_chunk(config, params, cond, keys, chunk, BANK)
 
-        self.upper, self.segments = upper, segments
-
-    def predict(self, observation, episodes: list[int]) -> Targets:
-        """Targets of the observed episodes: the outer loop's `predict`."""
-        padded = [self._pad(column, episodes) for column in observation]
-        subgoal, features = self.upper(*padded)
-        self._features = features
-        rows = [
-            np.asarray(column)[episodes]
-            for column in (subgoal.q_toggle, subgoal.gripper_toggle, subgoal.q_goal)
-        ]
-        return Targets(*rows)
+        self.segments = segments
 
     def propose(
         self, observation, targets: Targets, episodes: list[int], keys: jax.Array
@@ -81,10 +93,12 @@ class Agent:
 
         The condition holds the targets that the planner got, after merging.
         """
-        image, q, gripper = (self._pad(column, episodes) for column in observation)
-        targets = Targets(*(self._pad(column, episodes) for column in targets))
+        image, q, gripper, *aims = (
+            pad(column, episodes, self.batch) for column in (*observation, *targets)
+        )
+        targets = Targets(*aims)
         cond = Cond(
-            image=jnp.asarray(image if self._own_encoder else self._features),
+            image=jnp.asarray(image if self._own_encoder else self.predict.features),
             q=jnp.asarray(q),
             gripper=jnp.asarray(gripper),
             q_toggle=jnp.asarray(targets.q_toggle),
@@ -93,7 +107,9 @@ class Agent:
         )
         return lambda chunk: self.segments(cond, keys, jnp.asarray(chunk))
 
-    def _pad(self, column: np.ndarray, episodes: list[int]) -> np.ndarray:
-        padded = np.zeros((self.batch, *column.shape[1:]), column.dtype)
-        padded[episodes] = column
-        return padded
+
+def pad(column: np.ndarray, episodes: list[int], batch: int) -> np.ndarray:
+    """Rows of some episodes at their lanes, zeros elsewhere."""
+    padded = np.zeros((batch, *column.shape[1:]), column.dtype)
+    padded[episodes] = column
+    return padded

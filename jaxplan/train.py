@@ -55,8 +55,8 @@ LOSSES = {
     "sampler": diffusion.loss,
     "cvae": cvae.loss,
     "gan": gan.loss,
-    "few_step": few_step.loss,
 }
+"""Of the samplers that learn from demonstrations alone."""
 Training = PredictorTraining | SegmentTraining
 RUNS = Path("runs")
 

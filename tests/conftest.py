@@ -80,3 +80,16 @@ def demonstrate(mug_task, mug_planner):
 @pytest.fixture(scope="session")
 def demonstration(demonstrate):
     return demonstrate(range(4))
+
+
+@pytest.fixture(scope="module")
+def demos(tmp_path_factory) -> str:
+    """A directory of demonstrations small enough to learn from in a test."""
+    from toy_demonstrations import demonstrations
+
+    from jaxplan import data
+
+    directory = tmp_path_factory.mktemp("demos")
+    data.write_shard(data.shard_path(directory, 0), demonstrations())
+    data.write_manifest(directory, {"made": "for a test"})
+    return str(directory)

@@ -9,10 +9,10 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from test_learning import demonstrations
+from toy_demonstrations import demonstrations
 
-from jaxplan import data, learning, train
 from jaxplan import diffusion as maths
+from jaxplan import learning, train
 from jaxplan.learning import cvae, diffusion, few_step, gan, loop, sampler
 from jaxplan.networks import init
 
@@ -81,14 +81,6 @@ def test_a_pupil_learns_where_its_teacher_ends():
     for name, error in expected.items():
         expected_mean = float(jnp.mean(error**2))
         assert float(parts[name]) == pytest.approx(expected_mean, rel=1e-3)
-
-
-@pytest.fixture(scope="module")
-def demos(tmp_path_factory) -> str:
-    directory = tmp_path_factory.mktemp("demos")
-    data.write_shard(data.shard_path(directory, 0), demonstrations())
-    data.write_manifest(directory, {"made": "for a test"})
-    return str(directory)
 
 
 @pytest.fixture(scope="module")

@@ -111,10 +111,15 @@ def mujoco_model(scene: Scene, reach: float = 0.0) -> mujoco.MjModel:
     model.opt.disableflags |= flags.mjDSBL_MIDPHASE
     model.opt.disableflags &= ~(flags.mjDSBL_CONTACT | flags.mjDSBL_CONSTRAINT)
     model.opt.enableflags = 0
-    for margin in (model.geom_margin, model.body_margin, model.pair_margin):
+    for margin in _margins(model):
         margin[:] = reach
     model.geom_gap[:] = model.pair_gap[:] = 0
     return model
+
+
+def _margins(model: mujoco.MjModel) -> tuple[np.ndarray, ...]:
+    """Every margin that the collision pipeline adds up, to be written into."""
+    return model.geom_margin, model.body_margin, model.pair_margin
 
 
 def fill_slots(
@@ -256,12 +261,11 @@ def _doubt(
     and upper arm, 21 mm deep where they are 33 mm apart. Without a margin the verdict of
     `mj_collision`, which physics uses, is right about them.
     """
-    margins = model.geom_margin, model.body_margin, model.pair_margin
-    kept = [margin.copy() for margin in margins]
-    for margin in margins:
+    kept = [margin.copy() for margin in _margins(model)]
+    for margin in _margins(model):
         margin[:] = 0
     mujoco.mj_collision(model, data)
-    for margin, own in zip(margins, kept, strict=True):
+    for margin, own in zip(_margins(model), kept, strict=True):
         margin[:] = own
     touching = {frozenset(pair) for pair in data.contact.geom.tolist()}
     for row in np.flatnonzero(distance <= 0):

@@ -12,10 +12,12 @@ from jaxplan.data.schema import DataError as DataError
 from jaxplan.data.schema import Shard as Shard
 from jaxplan.data.schema import as_shard as as_shard
 from jaxplan.data.schema import concatenate as concatenate
+from jaxplan.data.shards import MANIFEST as MANIFEST
 from jaxplan.data.shards import missing_shards as missing_shards
 from jaxplan.data.shards import read_demonstrations as read_demonstrations
 from jaxplan.data.shards import read_manifest as read_manifest
 from jaxplan.data.shards import read_shard as read_shard
+from jaxplan.data.shards import save_manifest as save_manifest
 from jaxplan.data.shards import shard_path as shard_path
 from jaxplan.data.shards import verify as verify
 from jaxplan.data.shards import write_manifest as write_manifest

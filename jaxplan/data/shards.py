@@ -6,7 +6,7 @@ on its arrays only, so a collection that was killed and resumed equals one that 
 
 import json
 import os
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -60,9 +60,18 @@ def write_manifest(directory: str | os.PathLike, settings: Mapping) -> dict:
     Call it once before collecting (it fixes the settings) and once after.
     """
     shards = sorted(Path(directory).glob("shard_*.npz"))
+    return save_manifest(
+        directory, settings, {path.name: sha256(path) for path in shards}
+    )
+
+
+def save_manifest(
+    directory: str | os.PathLike, settings: Mapping, shards: Mapping[str, str]
+) -> dict:
+    """Writes `{"settings": ..., "shards": {name: SHA-256}}`, which it returns."""
     manifest = {
         "settings": json.loads(json.dumps(dict(settings))),
-        "shards": {path.name: sha256(path) for path in shards},
+        "shards": dict(shards),
     }
     text = json.dumps(manifest, indent=2, sort_keys=True) + "\n"
     write_atomic(Path(directory) / MANIFEST, text.encode())
@@ -85,8 +94,12 @@ def read_manifest(directory: str | os.PathLike) -> dict:
         raise DataError(f"damaged manifest: {directory / MANIFEST}") from None
 
 
-def verify(directory: str | os.PathLike) -> dict:
-    """Checks every shard's SHA-256 against the manifest, which it returns.
+def verify(directory: str | os.PathLike, names: Collection[str] | None = None) -> dict:
+    """Checks shards' SHA-256 against the manifest, which it returns.
+
+    Args:
+        directory: Of the shards.
+        names: Which; None = all that are listed.
 
     Raises:
         DataError: Names the first shard that is missing or differs; or none is listed.
@@ -96,9 +109,9 @@ def verify(directory: str | os.PathLike) -> dict:
         raise DataError(
             f"no shards listed in {Path(directory) / MANIFEST}: unfinished?"
         )
-    for name, digest in manifest["shards"].items():
-        path = Path(directory) / name
-        if not path.is_file():
+    for name in manifest["shards"] if names is None else names:
+        path, digest = Path(directory) / name, manifest["shards"].get(name)
+        if digest is None or not path.is_file():
             raise DataError(f"missing shard: {path}")
         if sha256(path) != digest:
             raise DataError(f"damaged shard: {path} (checksum differs from {MANIFEST})")

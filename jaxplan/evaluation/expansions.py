@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from jaxplan.evaluation.statistics import bootstrap, wilson
+from jaxplan.evaluation.statistics import bootstrap, ratio_of_means, wilson
 from jaxplan.evaluation.tables import Estimate
 
 
@@ -49,20 +49,11 @@ def normalised(
     if whole_trials:
         sides = [_trials(c, r) for c, r in ((counts, rows), (ours, own_rows))]
     else:
-        sides = [
-            (c.expansions * r, r.astype(float))
-            for c, r in ((counts, rows), (ours, own_rows))
-        ]
-    (total, number), (own_total, own_number) = sides
-    group = np.arange(len(total)) if whole_trials else counts.trial
-
-    def ratio(weights: np.ndarray) -> np.ndarray:
-        with np.errstate(divide="ignore", invalid="ignore"):
-            mean = (weights @ total) / (weights @ number)
-            own = (weights @ own_total) / (weights @ own_number)
-            return mean / own
-
-    value = float(ratio(np.ones((1, len(total))))[0])
+        sides = [(c.expansions * r, r) for c, r in ((counts, rows), (ours, own_rows))]
+    ratio = ratio_of_means(*sides[0], *sides[1])
+    size = len(sides[0][0])
+    group = np.arange(size) if whole_trials else counts.trial
+    value = float(ratio(np.ones((1, size)))[0])
     return Estimate(value, *bootstrap(ratio, group))
 
 
@@ -72,5 +63,5 @@ def _trials(counts: Counts, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     total = np.bincount(counts.trial, counts.expansions * rows, size)
     failed = np.bincount(counts.trial, rows & ~counts.solved, size) > 0
     there = np.bincount(counts.trial, rows, size) > 0
-    good = (there & ~failed).astype(float)
+    good = there & ~failed
     return total * good, good

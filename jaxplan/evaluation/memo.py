@@ -3,6 +3,7 @@
 import hashlib
 import json
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,7 @@ from jaxplan.data import write_atomic
 PLANNING = ("planning",)
 SAMPLING = (*PLANNING, "samplers", "diffusion", "networks")
 """Packages whose code decides what a piece's result is. Not `collision`: its verdicts are C
-MuJoCo's, however they are computed."""
+MuJoCo's, however they are computed. Delete the pieces after a change to what collides."""
 
 
 class Memo:
@@ -40,6 +41,7 @@ class Memo:
         return result
 
 
+@cache
 def code_digest(packages: tuple[str, ...] = SAMPLING) -> str:
     """Of their source, for the settings: a change to a planner is another measurement."""
     digest = hashlib.sha256()

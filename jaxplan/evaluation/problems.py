@@ -5,7 +5,6 @@ the learned samplers are conditioned on. Shards of whole episodes lie in a direc
 a manifest of checksums (`jaxplan.data`).
 """
 
-import json
 import os
 from pathlib import Path
 from typing import NamedTuple
@@ -14,9 +13,16 @@ import jax
 import numpy as np
 
 from jaxplan.collision import World
-from jaxplan.data import DataError, sha256, write_atomic, write_npz
-
-MANIFEST = "manifest.json"
+from jaxplan.data import (
+    MANIFEST,
+    DataError,
+    read_manifest,
+    save_manifest,
+    sha256,
+    verify,
+    write_npz,
+)
+from jaxplan.rollout import phase_keys
 
 
 class Problems(NamedTuple):
@@ -74,39 +80,20 @@ class Problems(NamedTuple):
 
     def keys(self) -> jax.Array:
         """[P] typed keys, as the outer loop gives them to search and sampler."""
-        return jax.vmap(
-            lambda seed, phase: jax.random.fold_in(jax.random.key(seed), phase)
-        )(self.seed.astype(np.uint32), self.phase)
-
-
-def read_manifest(directory: str | os.PathLike) -> dict | None:
-    """`{"settings": ..., "shards": {name: SHA-256}}`, or None where nothing was begun.
-
-    Raises:
-        DataError: It is damaged.
-    """
-    path = Path(directory) / MANIFEST
-    if not path.exists():
-        return None
-    try:
-        manifest = json.loads(path.read_text(encoding="utf-8"))
-        if not {"settings", "shards"} <= set(manifest):
-            raise KeyError("shards")
-    except (ValueError, KeyError, TypeError):
-        raise DataError(f"damaged manifest: {path}") from None
-    return manifest
+        return phase_keys(self.seed, self.phase)
 
 
 def begin(directory: str | os.PathLike, settings: dict) -> dict[str, str]:
     """Begins a directory or goes on with it; returns the shards that are there and intact.
 
     Raises:
-        DataError: It was begun with other settings.
+        DataError: It was begun with other settings, or its manifest is damaged.
     """
-    manifest = read_manifest(directory)
-    if manifest is None:
-        _write_manifest(directory, settings, {})
+    directory = Path(directory)
+    if not (directory / MANIFEST).exists():
+        save_manifest(directory, settings, {})
         return {}
+    manifest = read_manifest(directory)
     if manifest["settings"] != settings:
         raise DataError(
             f"{directory} was recorded with {manifest['settings']}, not {settings}"
@@ -114,18 +101,17 @@ def begin(directory: str | os.PathLike, settings: dict) -> dict[str, str]:
     return {
         name: digest
         for name, digest in manifest["shards"].items()
-        if (path := Path(directory) / name).is_file() and sha256(path) == digest
+        if (path := directory / name).is_file() and sha256(path) == digest
     }
 
 
 def add(directory: str | os.PathLike, name: str, problems: Problems) -> None:
     """Writes a shard, and its checksum into the manifest."""
-    write_npz(Path(directory) / name, problems._asdict())
+    path = Path(directory) / name
+    write_npz(path, problems._asdict())
     manifest = read_manifest(directory)
-    assert manifest is not None, "`begin` comes first"
-    digest = sha256(Path(directory) / name)
-    shards = manifest["shards"] | {name: digest}
-    _write_manifest(directory, manifest["settings"], shards)
+    shards = manifest["shards"] | {name: sha256(path)}
+    save_manifest(directory, manifest["settings"], shards)
 
 
 def read(directory: str | os.PathLike, names: list[str]) -> Problems:
@@ -134,22 +120,9 @@ def read(directory: str | os.PathLike, names: list[str]) -> Problems:
     Raises:
         DataError: Names the shard that is missing or damaged.
     """
-    shards = (read_manifest(directory) or {"shards": {}})["shards"]
+    verify(directory, names)
     parts = []
     for name in names:
-        path = Path(directory) / name
-        if name not in shards or not path.is_file():
-            raise DataError(f"missing shard: {path}")
-        if sha256(path) != shards[name]:
-            raise DataError(f"damaged shard: {path} (checksum differs from {MANIFEST})")
-        with np.load(path, allow_pickle=False) as archive:
+        with np.load(Path(directory) / name, allow_pickle=False) as archive:
             parts.append([archive[field] for field in Problems._fields])
     return Problems(*(np.concatenate(column) for column in zip(*parts, strict=True)))
-
-
-def _write_manifest(
-    directory: str | os.PathLike, settings: dict, shards: dict[str, str]
-) -> None:
-    manifest = {"settings": settings, "shards": shards}
-    text = json.dumps(manifest, indent=2, sort_keys=True) + "\n"
-    write_atomic(Path(directory) / MANIFEST, text.encode())

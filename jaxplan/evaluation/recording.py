@@ -8,7 +8,6 @@ network fixed"). The expert's problems depend on the seeds alone.
 import hashlib
 import itertools
 from collections.abc import Callable, Sequence
-from functools import partial
 from pathlib import Path
 from typing import Literal
 
@@ -16,13 +15,13 @@ import jax
 import numpy as np
 
 from jaxplan import collision
+from jaxplan.agent import Upper
 from jaxplan.collision import World
 from jaxplan.config import PAPER_PLANNER, DemonstrationConfig
 from jaxplan.evaluation import problems as store
 from jaxplan.evaluation.problems import Problems
 from jaxplan.learning import Weights
 from jaxplan.motion import MotionPlanner, jit
-from jaxplan.networks import predict
 from jaxplan.rollout import Phase, Predict, Targets, rollout
 from jaxplan.scene.panda import PANDA_LIMITS
 from jaxplan.tasks.mug.demonstrate import ExpertPolicy
@@ -32,7 +31,7 @@ from jaxplan.tasks.mug.way import expert_planner
 
 SHARD = 32
 """Episodes a shard, in lockstep."""
-Upper = Literal["network", "expert"]
+Predictor = Literal["network", "expert"]
 
 
 def record(
@@ -107,7 +106,7 @@ class Recorder:
         self._policy = ExpertPolicy(self._task, DemonstrationConfig(noisy_episodes=0))
         self._predict: Predict = self._expert
         if predictor is not None:
-            self._predict = partial(_network, _upper(predictor))
+            self._predict = Upper(predictor, SHARD)
         points = collision.points_for(1.0, PAPER_PLANNER.edge_resolution)
         self._free = jit(
             lambda worlds, q0, q1: collision.motion_free(
@@ -177,24 +176,3 @@ class Recorder:
             part = (q0 + share * (q1 - q0) for share in (low, high))
             free &= np.asarray(self._free(worlds, *part))
         return free
-
-
-def _upper(predictor: Weights) -> Callable:
-    """The upper network for `SHARD` lanes, compiled once."""
-
-    @jax.jit
-    def upper(image, q, gripper):
-        return predict(predictor.config, predictor.params, image, q, gripper)[0]
-
-    return upper
-
-
-def _network(upper: Callable, observation, episodes: list[int]) -> Targets:
-    padded = []
-    for column in observation:
-        full = np.zeros((SHARD, *column.shape[1:]), column.dtype)
-        full[episodes] = column
-        padded.append(full)
-    subgoal = upper(*padded)
-    rows = (subgoal.q_toggle, subgoal.gripper_toggle, subgoal.q_goal)
-    return Targets(*(np.asarray(column)[episodes] for column in rows))

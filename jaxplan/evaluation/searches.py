@@ -81,8 +81,8 @@ class Banks:
 
         @jit
         def draw(cond, keys, chunk):
-            keys = jax.vmap(jax.random.fold_in, (0, None))(keys, chunk)
-            return samplers.draw(config, sampler.params, cond, keys, BANK)
+            params = sampler.params
+            return samplers.draw_chunk(config, params, cond, keys, chunk, BANK)
 
         self._draw = draw
 
@@ -119,7 +119,8 @@ class Banks:
             cond = jax.tree.map(
                 lambda leaf, at=block: jnp.asarray(leaf[at]), self._cond
             )
-            drawn = self._draw(cond, self._keys[block], jnp.int32(chunk))
+            number = jnp.full(BLOCK, chunk, jnp.int32)
+            drawn = self._draw(cond, self._keys[block], number)
             _put(bank, part, drawn)
             there[part] = True
         return jax.tree.map(lambda leaf: leaf[rows], bank)

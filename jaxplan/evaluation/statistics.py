@@ -21,6 +21,27 @@ def wilson(successes: int, trials: int, z: float = 1.959964) -> tuple[float, flo
     return (middle - spread) / scale, (middle + spread) / scale
 
 
+def ratio_of_means(
+    total: np.ndarray, count: np.ndarray, own_total: np.ndarray, own_count: np.ndarray
+) -> Callable[[np.ndarray], np.ndarray]:
+    """A statistic for `bootstrap`: sum(total) / sum(count) over the same of another side.
+
+    Args:
+        total: [N] sums of each group, 0 where it does not count.
+        count: [N] how many observations each sum is of.
+        own_total: Of the side that the ratio is to.
+        own_count: Likewise.
+    """
+
+    def ratio(weights: np.ndarray) -> np.ndarray:
+        with np.errstate(divide="ignore", invalid="ignore"):
+            mean = (weights @ total) / (weights @ count.astype(float))
+            own = (weights @ own_total) / (weights @ own_count.astype(float))
+            return mean / own
+
+    return ratio
+
+
 def bootstrap(
     statistic: Callable[[np.ndarray], np.ndarray],
     groups: np.ndarray,

@@ -15,8 +15,8 @@ from jaxplan.evaluation.problems import Problems
 from jaxplan.evaluation.recording import record
 from jaxplan.evaluation.searches import Answers, Banks, Searcher, conditions
 from jaxplan.evaluation.seeds import parse_seeds
-from jaxplan.learning import Weights, WeightsError, load_weights
-from jaxplan.learning.pretrained import DIRECTORY
+from jaxplan.learning import NoWeights, Weights, load_weights
+from jaxplan.learning.pretrained import shipped
 from jaxplan.networks import Cond
 from jaxplan.scene import Scene
 from jaxplan.tasks.mug.scene import Variant, build
@@ -65,7 +65,7 @@ class RecordedStudy:
 
     def __init__(self, args: StudyArgs, memo: Memo | None = None) -> None:
         self.args = args
-        self.directory = args.weights or _shipped(args.variant)
+        self.directory = args.weights or shipped(args.variant)
         self.memo = memo or Memo()
         self.predictor = load_weights("predictor", self.directory)
         upper = self.predictor if args.upper == "network" else None
@@ -76,18 +76,19 @@ class RecordedStudy:
         self.trials = len(args.range)
         self.problems: Problems = recorded.take(np.flatnonzero(recorded.success))
         self.scene = Scene.from_mjcf(build("planning", variant=args.variant))
+        self._weights: dict[str, Weights | None] = {}
         self._cond: Cond | None = None
         self._banks: dict[Any, Banks] = {}
         self._searchers: dict[PlannerConfig, Searcher] = {}
 
     def weights(self, name: str) -> Weights | None:
-        """A network's weights, or None where the directory has none of that name."""
-        try:
-            return load_weights(name, self.directory)
-        except WeightsError as error:
-            if str(error).startswith(f"no {name} in"):
-                return None
-            raise
+        """A network's weights, read once, or None where the directory has none of that name."""
+        if name not in self._weights:
+            try:
+                self._weights[name] = load_weights(name, self.directory)
+            except NoWeights:
+                self._weights[name] = None
+        return self._weights[name]
 
     def settings(self) -> dict[str, Any]:
         """What a result's JSON says of the problems and the weights."""
@@ -184,9 +185,3 @@ def masked(cond: Cond, mask: str) -> Cond:
         mean = np.broadcast_to(np.mean(cond.image, axis=0), cond.image.shape)
         return cond._replace(image=np.array(mean))  # pyright: ignore
     return cond
-
-
-def _shipped(variant: Variant) -> Path:
-    """A variant has its own weights where there are any."""
-    own = DIRECTORY / variant
-    return own if (own / "manifest.json").is_file() else DIRECTORY

@@ -39,3 +39,16 @@ def draw(
         Segment with direction [P, n, 7], length [P, n] [rad], and with `tree_context` base.
     """
     return _DRAW[type(config)](config, params, cond, keys, n)
+
+
+def draw_chunk(
+    config: SegmentConfig,
+    params: dict,
+    cond: Cond,
+    keys: jax.Array,
+    chunk: jax.Array,
+    n: int,
+) -> Segment:
+    """Bank number `chunk` [P] of each problem: as `draw`, with fresh noise for each number."""
+    keys = jax.vmap(jax.random.fold_in)(keys, chunk)
+    return draw(config, params, cond, keys, n)
