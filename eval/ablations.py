@@ -34,6 +34,7 @@ MASKS = {
 }
 SWITCHES: dict[str, dict[str, Any]] = {
     "as it is": {},
+    "no tree context (the letter)": {"tree_context": False},
     "uniform segments independent of q_rand (the letter)": {
         "uniform_mode": "independent"
     },

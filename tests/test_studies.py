@@ -3,7 +3,9 @@
 import dataclasses
 import json
 import math
+import subprocess
 import sys
+import time
 from pathlib import Path
 
 import jax
@@ -148,6 +150,38 @@ def test_a_damaged_shard_is_named_and_made_again(tmp_path):
     with pytest.raises(DataError, match=r"p0\.npz"):
         store.read(tmp_path, ["p0.npz"])
     assert store.begin(tmp_path, {}) == {}
+
+
+@pytest.mark.slow
+def test_a_killed_study_says_what_an_unbroken_one_says(tmp_path):
+    """`kill -9` in the middle of Table 2 loses nothing and repeats nothing."""
+    script = Path(__file__).parents[1] / "eval" / "expansions.py"
+    seeds = "300000:300008"
+
+    def start(name: str) -> subprocess.Popen:
+        (tmp_path / name).mkdir(exist_ok=True)
+        command = [sys.executable, script, "--quick", "--seeds", seeds]
+        return subprocess.Popen(command, cwd=tmp_path / name)
+
+    def pieces() -> dict[str, int]:
+        found = (tmp_path / "killed" / "runs" / "pieces").glob("*.json")
+        return {path.name: path.stat().st_mtime_ns for path in found}
+
+    process, deadline = start("killed"), time.monotonic() + 600
+    while len(pieces()) < 5 and time.monotonic() < deadline:
+        time.sleep(0.05)
+    process.kill()
+    process.wait()
+    before = pieces()
+    assert 5 <= len(before) < 15, "killed at no good time"
+    assert start("killed").wait(600) == 0
+    assert before.items() <= pieces().items()
+    assert start("unbroken").wait(600) == 0
+    killed, unbroken = (
+        json.loads((tmp_path / name / "runs" / "expansions_plain.json").read_text())
+        for name in ("killed", "unbroken")
+    )
+    assert killed["tables"] == unbroken["tables"]
 
 
 def test_keys_are_those_of_the_outer_loop():
