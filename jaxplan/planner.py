@@ -32,7 +32,7 @@ from jaxplan.trajectory import Rung, make_trajectory
 
 Sampler = Callable[[jax.Array, jax.Array, jax.Array, int], Segment]
 """`(key, q_start [d], q_goal [d], count) -> Segment [count]`: tree-extension segments for a
-problem, traced by JAX."""
+problem, with the configurations where they begin or without; traced by JAX."""
 
 BANK = 64
 """Segments that a sampler is asked for at a time."""
@@ -324,12 +324,14 @@ class Planner:
             key = jax.random.fold_in(jax.random.fold_in(key, 2**31), chunk)
             assert self._sampler is not None
             segment = Segment(*self._sampler(key, q_start, q_goal, count))
-            shapes = jnp.shape(segment.direction), jnp.shape(segment.length)
-            if shapes != ((count, len(q_start)), (count,)):
-                raise ValueError(
-                    f"the sampler's direction and length have shapes {shapes[0]} and "
-                    f"{shapes[1]}, expected {(count, len(q_start))} and {(count,)}"
-                )
+            many = count, len(q_start)
+            expected = {"direction": many, "length": (count,), "base": many}
+            for name, leaf in segment._asdict().items():
+                if leaf is not None and jnp.shape(leaf) != expected[name]:
+                    raise ValueError(
+                        f"the sampler's {name} has shape {jnp.shape(leaf)}, "
+                        f"expected {expected[name]}"
+                    )
             return segment
 
         return _jit(jax.vmap(bank))

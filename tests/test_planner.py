@@ -296,25 +296,29 @@ def test_a_broken_sampler_cannot_spoil_planning(broken, value):
     assert planner.certify(answer).valid
 
 
-@pytest.fixture(scope="module")
-def broken(scene):
+@pytest.fixture(scope="module", params=[False, True], ids=["", "with bases"])
+def broken(scene, request):
     """A planner whose sampler gives something useless, chosen by the start's wrist."""
     values = [np.nan, np.inf, 0.0, 1e30]
     wrists = np.array([0.1, 0.2, 0.3, 0.4])
 
     def sampler(key, q_start, q_goal, count):
         value = jnp.array(values)[jnp.abs(wrists - q_start[3]).argmin()]
-        return Segment(jnp.full((count, 4), value), jnp.full(count, value))
+        many = jnp.full((count, 4), value)
+        return Segment(many, jnp.full(count, value), many if request.param else None)
 
     planner = Planner(scene, CONFIG, sampler=sampler)
     return planner, dict(zip(values, wrists, strict=True))
 
 
-def test_a_sampler_of_the_wrong_shape_is_named(scene):
-    planner = Planner(scene, CONFIG, sampler=lambda key, a, b, count: (a, b))
-    with pytest.raises(
-        ValueError, match=r"sampler's direction and length have shapes \(4,\)"
-    ):
+@pytest.mark.parametrize("wrong", ["direction", "length", "base"])
+def test_a_sampler_of_the_wrong_shape_is_named(scene, wrong):
+    def sampler(key, q_start, q_goal, count):
+        many = jnp.zeros((count, 4))
+        return Segment(many, many[:, 0], many)._replace(**{wrong: jnp.zeros((3, 4))})
+
+    planner = Planner(scene, CONFIG, sampler=sampler)
+    with pytest.raises(ValueError, match=rf"sampler's {wrong} has shape \(3, 4\)"):
         planner.plan(LEFT, RIGHT)
 
 
