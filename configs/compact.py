@@ -67,9 +67,10 @@ common: dict[str, Any] = {
 """The same budget for the samplers that learn from demonstrations.
 
 Tables below: a row a setting, trained on the cluttered scene; on held-out episodes precision and
-coverage (`learning.sampler`; median and 90th percentile [deg]); then expansions over the 379 blocked
-phases of seeds 310016:310112, RRT-Connect and RRT, by which the settings were chosen: precision and
-coverage would choose the first CVAE, which keeps to the middle of the way, in and out of obstacles.
+coverage (`learning.sampler`; median and 90th percentile [deg]); then expansions over the 379
+blocked phases of seeds 310016:310112, RRT-Connect and RRT, by which the settings were chosen:
+precision and coverage would choose the first CVAE, which keeps to the middle of the way, in and
+out of obstacles.
 """
 
 # temperature    precision     coverage      expansions
@@ -94,10 +95,11 @@ cvae = CvaeTraining(
     **common,
 )
 
-# rate, beta_1, R1, noise, latent    precision    coverage
-# 5e-4, 0.0, 1.0, 0.1,  16           5.8   11.2   3.5   12.6
-# 5e-4, 0.5, 0.1, 0.02, 16           6.9   13.5   5.3   16.1
-# 1e-3, 0.5, 0.1, 0.1,   8           6.8   11.5   6.0   16.6
+# R1, noise      precision     coverage      expansions
+# 1.0, 0.1       6.2   17.9    4.2   18.1     76    93
+# 1.0, 0.2       6.5   15.0    4.1   16.7     97    99
+# 0.1, 0.02      5.9   13.9    4.0   17.0    136   220
+# Without bases, 5e-4 with beta_1 = 0 was better than 5e-4 and 1e-3 with 0.5.
 gan = GanTraining(
     network=GanConfig(generator=(256, 256, 256), discriminator=(256, 256), **segment),
     r1=1.0,

@@ -38,7 +38,6 @@ SWITCHES: dict[str, dict[str, Any]] = {
     "uniform segments independent of q_rand (the letter)": {
         "uniform_mode": "independent"
     },
-    "adaptive p_uniform": {"adaptive_uniform": True},
     "ties toward the toggle, 0.05 rad": {"toggle_tie_break": 0.05},
     "goal's tree uniform only": {"goal_tree": "uniform"},
     "4 workers": {"workers": 4},

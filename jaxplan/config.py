@@ -24,9 +24,6 @@ class PlannerConfig:
     p_uniform: float = 0.2
     """Probability that a proposal is a uniform segment and not a learned one, if there is a
     sampler."""
-    adaptive_uniform: bool = False
-    """The share of learned proposals, 1 - p_uniform, shrinks with the share of them that were
-    rejected so far in the search."""
     tree_context: bool = True
     """A learned segment that says where it begins is taken from the node nearest to its end,
     straight at that end, and followed there. Off: from the node nearest to q_goal, along its

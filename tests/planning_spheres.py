@@ -99,7 +99,7 @@ class Oracle:
         self.world, self.segments, self.config = world, segments, config
         self.q_start, self.q_goal, self.q_toggle = q_start, q_goal, q_toggle
         self.q, self.parent, self.side = [q_start], [-1], [0]
-        self.flags, self.used, self.tried, self.kept = [], 0, 0, 0
+        self.flags, self.used = [], 0
 
     def d(self, a, b):
         weight = 1 if self.config.metric is None else np.array(self.config.metric)
@@ -151,11 +151,7 @@ class Oracle:
         config, k = self.config, len(self.flags)
         draw = jax.tree.map(lambda x: x[k], self.draws)
         learns = side == 0 or config.goal_tree == "mirrored"
-        learned = draw.learned
-        if config.adaptive_uniform:
-            trust = (self.kept + 1) / (self.tried + 1)
-            learned = draw.coin >= 1 - (1 - config.p_uniform) * trust
-        if self.segments is not None and learned and learns:
+        if self.segments is not None and draw.learned and learns:
             u = np.asarray(self.segments.direction[self.used])
             s = np.asarray(self.segments.length[self.used])
             self.used += 1
@@ -169,7 +165,6 @@ class Oracle:
                 s = np.clip(s, config.step_min, config.step_max)
                 base = self.nearest(target, side, config.toggle_tie_break > 0)
                 node, reached = self.move(base, side, target, s, direction)
-                self.tried, self.kept = self.tried + 1, self.kept + (node is not None)
                 return node, None if reached else end
         length, direction = draw.segment.length, None
         target = goal if draw.goal else draw.q_rand

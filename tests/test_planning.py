@@ -23,7 +23,6 @@ from planning_spheres import (
 from jaxplan.config import PAPER_PLANNER
 from jaxplan.planning import PlanResult, Segment, Status, lanes, make_planner, search
 from jaxplan.planning.edges import all_free, motions_free, points_for, stages
-from jaxplan.planning.proposal import adapted, draw_numbers
 from jaxplan.planning.state import Query
 
 METHODS = ("rrt", "rrt_connect")
@@ -242,12 +241,10 @@ ORACLE_CONFIGS = {
     "rrt, with bases": settings_of(method="rrt"),
     "rrt_connect, with bases": settings_of(),
     "rrt_connect, with bases, other settings": settings_of(
-        goal_tree="uniform", toggle_tie_break=0.2, adaptive_uniform=True
+        goal_tree="uniform", toggle_tie_break=0.2
     ),
     "rrt, greedy": settings_of(method="rrt", greedy=True),
     "rrt_connect, with bases, greedy": settings_of(greedy=True, p_uniform=0.5),
-    "rrt, adaptive": settings_of(method="rrt", adaptive_uniform=True),
-    "rrt_connect, adaptive": settings_of(adaptive_uniform=True),
 }
 
 
@@ -279,19 +276,6 @@ def test_batched_search_is_the_sequential_one(name):
         np.testing.assert_array_equal(tree.parent[p, :size], oracle.parent)
         np.testing.assert_array_equal(tree.side[p, :size], oracle.side)
         np.testing.assert_allclose(tree.q[p, :size], oracle.q, atol=1e-5)
-
-
-def test_rejected_segments_make_the_sampler_rarer():
-    """All kept: the fixed mixture. None of nine kept: a tenth of it, and never nothing."""
-    config = replace(PAPER_PLANNER, p_uniform=0.2)
-    keys = jax.random.split(jax.random.key(0), 3)
-    expansion = jnp.tile(jnp.arange(4000), (3, 1))
-    limits = jnp.full(7, -Q_MAX), jnp.full(7, Q_MAX)
-    draw = draw_numbers(keys, expansion, limits, config)
-    tried, kept = jnp.array([0, 9, 9]), jnp.array([0, 9, 0])
-    share = adapted(draw, tried, kept, config).learned.mean(axis=1)
-    np.testing.assert_allclose(share, [0.8, 0.8, 0.08], atol=0.02)
-    np.testing.assert_allclose(share[:2], draw.learned[:2].mean(axis=1), atol=1e-3)
 
 
 @pytest.fixture(scope="module", params=METHODS)

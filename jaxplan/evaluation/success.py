@@ -6,6 +6,8 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
+import numpy as np
+
 from jaxplan.agent import Agent
 from jaxplan.config import PAPER_PLANNER, PlannerConfig, RolloutConfig, TrajectoryConfig
 from jaxplan.evaluation.memo import Memo, code_digest
@@ -14,7 +16,7 @@ from jaxplan.evaluation.toggle_error import ToggleError, ToggleErrors, summarize
 from jaxplan.learning import Weights
 from jaxplan.motion import MotionPlanner
 from jaxplan.provenance import versions
-from jaxplan.rollout import EpisodeRecord, Phase, Predict, rollout
+from jaxplan.rollout import EpisodeRecord, Phase, Predict, Targets, rollout
 from jaxplan.scene.panda import PANDA_LIMITS
 from jaxplan.simulation.physics import CONTROL_PERIOD
 from jaxplan.tasks.mug.scene import Variant
@@ -36,6 +38,8 @@ class Success:
     friction: float = 1.0
     """Factor on all friction; 0 shows that grasps hold by friction alone."""
     variant: Variant = "plain"
+    prediction_noise: float = 0.0
+    """Standard deviation of noise on each joint of what the upper network says [rad]."""
 
 
 class Study:
@@ -142,12 +146,29 @@ class Study:
         return rollout(
             self.task,
             seeds,
-            predict or self.agent.predict,
+            self._noisy(predict or self.agent.predict, seeds),
             self.planner,
             self.agent.propose,
             config,
             listen,
         )
+
+    def _noisy(self, predict: Predict, seeds: Sequence[int]) -> Predict:
+        """The upper network, less precise by `prediction_noise`."""
+        scale = self.config.prediction_noise
+        if scale == 0:
+            return predict
+        rng = np.random.default_rng(list(seeds))
+
+        def noisy(observation: Any, episodes: list[int]) -> Targets:
+            targets = predict(observation, episodes)
+            shape = targets.q_toggle.shape
+            return targets._replace(
+                q_toggle=targets.q_toggle + rng.normal(0, scale, shape),
+                q_goal=targets.q_goal + rng.normal(0, scale, shape),
+            )
+
+        return noisy
 
     def _result(self, episodes: list[dict[str, Any]]) -> dict[str, Any]:
         successes = sum(episode["success"] for episode in episodes)

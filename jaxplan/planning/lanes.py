@@ -172,7 +172,7 @@ def _harvest(
     asked = asked._replace(bound=jnp.where(anew, bound, jnp.inf))
     state = search.start(state, begins, asked, known, config)
     # A new attempt goes on counting, and so draws other random numbers.
-    for name in ("chunk", "used", "tried", "kept", "expansions", "accepted", "checks"):
+    for name in ("chunk", "used", "expansions", "accepted", "checks"):
         count = jnp.where(loaded, 0, getattr(state, name))
         state = state._replace(**{name: count})
     return Lanes(

@@ -25,8 +25,6 @@ class Draw(NamedTuple):
     """`[P, K, d]` uniform within the limits [rad]."""
     segment: Segment
     """UniformSegment: direction uniform on the sphere, length in [step_min, step_max]."""
-    coin: jax.Array
-    """`[P, K]` uniform in (0, 1), behind `learned`."""
 
 
 def draw_numbers(
@@ -53,26 +51,7 @@ def draw_numbers(
         segment=Segment(
             normal / jnp.linalg.norm(normal, axis=-1, keepdims=True), length
         ),
-        coin=uniform[..., 0],
     )
-
-
-def adapted(
-    draw: Draw, tried: jax.Array, kept: jax.Array, config: PlannerConfig
-) -> Draw:
-    """The draw under `adaptive_uniform`: rejected proposals make the sampler rarer.
-
-    The share of learned proposals is `(1 - p_uniform) (kept + 1) / (tried + 1)`: at first
-    that of the fixed mixture and never more, so uniform proposals keep their part.
-
-    Args:
-        draw: The random numbers.
-        tried: `[P]` learned proposals so far.
-        kept: `[P]` those of them whose motion was free.
-        config: Planner settings.
-    """
-    share = (1.0 - config.p_uniform) * (kept + 1) / (tried + 1)
-    return draw._replace(learned=draw.coin >= 1.0 - share[:, None])
 
 
 def mixture(
@@ -103,14 +82,10 @@ def mixture(
     to_goal = ~learned & draw.goal
     norm = jnp.linalg.norm(segment.direction, axis=-1, keepdims=True)
     length = jnp.clip(segment.length, config.step_min, config.step_max)
-    at_goal, row = (learned | to_goal)[..., None], learned[..., None]
-    based = segment.base is not None
+    based, row = segment.base is not None, learned[..., None]
+    end = segment.end if based else q_goal
     proposal = Proposal(
-        target=jnp.where(
-            row,
-            segment.end if based else q_goal,
-            jnp.where(at_goal, q_goal, draw.q_rand),
-        ),
+        target=jnp.where(row, end, jnp.where(to_goal[..., None], q_goal, draw.q_rand)),
         direction=jnp.where(row, segment.direction / norm, draw.segment.direction),
         length=jnp.where(learned, length, draw.segment.length),
         toward=jnp.where(learned, based, to_goal | (config.uniform_mode == "toward")),

@@ -21,7 +21,7 @@ import jax.numpy as jnp
 from jaxplan.config import PlannerConfig
 from jaxplan.planning import bounded, rrt, rrt_connect
 from jaxplan.planning.edges import ConfigFree, motions_free, points_for
-from jaxplan.planning.proposal import adapted, draw_numbers
+from jaxplan.planning.proposal import draw_numbers
 from jaxplan.planning.result import PlanResult, Status
 from jaxplan.planning.segment import Limits, Segment, extend
 from jaxplan.planning.state import Move, Outcome, Query, State, choose
@@ -80,8 +80,6 @@ def empty(problems: int, joints: int, keys: jax.Array, config: PlannerConfig) ->
         waiting=jnp.zeros_like(zero, bool),
         chunk=zero,
         used=zero,
-        tried=zero,
-        kept=zero,
         expansions=zero,
         accepted=zero,
         checks=zero,
@@ -143,8 +141,6 @@ def advance(
     worker = jnp.arange(config.workers, dtype=jnp.int32)
     number = state.expansions[:, None] + worker
     draw = draw_numbers(query.key, number, limits, config)
-    if config.adaptive_uniform:
-        draw = adapted(draw, state.tried, state.kept, config)
     most = None
     if optimises(config):
         draw, most = bounded.informed(draw, query, control.side, limits)
@@ -199,8 +195,6 @@ def advance(
         waiting=state.waiting | waiting,
         chunk=chunk,
         used=used,
-        tried=state.tried + jnp.sum(running & move.learned, axis=1, dtype=jnp.int32),
-        kept=state.kept + jnp.sum(free & move.learned, axis=1, dtype=jnp.int32),
         expansions=state.expansions + jnp.sum(running, axis=1, dtype=jnp.int32),
         accepted=state.accepted + jnp.sum(free, axis=1, dtype=jnp.int32),
         checks=state.checks + checks,

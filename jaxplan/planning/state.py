@@ -89,10 +89,6 @@ class State(NamedTuple):
     """`[P]` which bank comes next, or is in use."""
     used: jax.Array
     """`[P]` learned segments used so far."""
-    tried: jax.Array
-    """`[P]` learned proposals so far."""
-    kept: jax.Array
-    """`[P]` those of them whose motion was free."""
     expansions: jax.Array
     accepted: jax.Array
     checks: jax.Array
