@@ -121,6 +121,11 @@ class Bench:
         self.smoothed = self.sides[0]
         """Of this side the whole episode is timed, smoothing included."""
         self.first_calls: dict[str, float] = {}
+        # Of their own, since a phase whose straight motion is free draws no segments.
+        for name, sampler in self.samplers.items():
+            start = time.perf_counter()
+            sampler.of(*self.condition(0))(jnp.zeros(1, jnp.int32))
+            self.first_calls[f"{name}, a bank"] = time.perf_counter() - start
         for side in self.sides:
             start = time.perf_counter()
             self.plan(0, side)
@@ -128,6 +133,11 @@ class Bench:
         start = time.perf_counter()
         self.predict(0)
         self.first_calls["upper network"] = time.perf_counter() - start
+
+    def condition(self, row: int) -> tuple[Cond, jax.Array]:
+        """Of one problem, and its key."""
+        cond = jax.tree.map(lambda leaf: jnp.asarray(leaf[[row]]), self.cond)
+        return cond, self.keys[jnp.asarray([row])]
 
     def predict(self, row: int) -> float:
         """Seconds of the upper network."""
@@ -147,10 +157,9 @@ class Bench:
         p = self.problems
         world = jax.tree.map(lambda leaf: jnp.asarray(leaf[[row]]), p.worlds)
         ends = p.q_start[[row]], p.q_goal[[row]], p.q_toggle[[row]]
-        key, draw = self.keys[jnp.asarray([row])], None
-        sampler = self.samplers.get(side.name)
+        cond, key = self.condition(row)
+        draw, sampler = None, self.samplers.get(side.name)
         if sampler is not None:
-            cond = jax.tree.map(lambda leaf: jnp.asarray(leaf[[row]]), self.cond)
             sampler.seconds, draw = 0.0, sampler.of(cond, key)
         motion = self._planners[side.p_uniform]
         start = time.perf_counter()
@@ -192,8 +201,7 @@ def episode(bench: Bench, seed: int) -> dict[str, Any]:
 
 def prices(bench: Bench) -> dict[str, Any]:
     """Seconds of one proposal of each sampler, and of the first calls."""
-    cond = jax.tree.map(lambda leaf: jnp.asarray(leaf[[0]]), bench.cond)
-    key = bench.keys[jnp.asarray([0])]
+    cond, key = bench.condition(0)
     return {
         "seconds_per_proposal": {
             name: sampler.proposal(cond, key)
