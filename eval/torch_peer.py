@@ -134,22 +134,23 @@ class TorchSampler(nn.Module):
     def forward(
         self, x_t: torch.Tensor, t: torch.Tensor, cond: torch.Tensor
     ) -> torch.Tensor:
-        """eps [B, 8] for x_t [B, 8], t [B] and conditions [B, C]."""
+        """eps for x_t [B, size], t [B] and conditions [B, C]."""
         angles = t[:, None] * self.rates
         step = self.step(torch.cat([angles.sin(), angles.cos()], dim=-1))
         return self.denoiser(x_t, torch.cat([step, cond], dim=-1))
 
     @torch.inference_mode()
     def draw(self, cond: torch.Tensor) -> np.ndarray:
-        """`[B, 8]` x_0 of segments by DDIM, for conditions [B, C]."""
+        """`[B, size]` x_0 of segments by DDIM, for conditions [B, C]."""
         config = self.config
         joints = len(config.q_min)
         steps = diffusion.timesteps(
             config.num_train_timesteps, config.num_inference_steps
         )
         abars = diffusion.alphas_cumprod(config.num_train_timesteps)[steps].tolist()
-        clip = torch.tensor(np.asarray(diffusion.bounds(joints)))
-        x_t = torch.randn(len(cond), joints + 1)
+        clip = diffusion.bounds(joints, config.tree_context)
+        clip = torch.tensor(np.asarray(clip))
+        x_t = torch.randn(len(cond), config.size)
         for t, abar, abar_next in zip(steps, abars, [*abars[1:], 1.0], strict=True):
             eps = self(x_t, torch.full((len(cond),), float(t)), cond)
             x_0 = (x_t - (1 - abar) ** 0.5 * eps) / abar**0.5

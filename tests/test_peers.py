@@ -139,18 +139,20 @@ def check_same_eps(theirs, params):
     from jaxplan.networks import SamplerNetwork
 
     config, rng = theirs.config, np.random.default_rng(0)
-    x_t, cond = rng.normal(size=(4, 8)), rng.normal(size=(4, config.cond_features))
-    x_t, cond, t = x_t.astype("f"), cond.astype("f"), np.array([0, 4, 48, 96])
+    x_t = rng.normal(size=(4, config.size)).astype("f")
+    cond, t = rng.normal(size=(4, config.cond_features)), np.array([0, 4, 48, 96])
+    cond = cond.astype("f")
     network, params = SamplerNetwork(config), {"params": params}
     film = network.apply(params, cond, t, method="film")
     ours = network.apply(params, x_t, film, method="denoise")
     with torch.inference_mode():
         eps = theirs(*map(torch.tensor, (x_t, t.astype("f"), cond))).numpy()
     np.testing.assert_allclose(ours, eps, atol=2e-5)
-    assert theirs.draw(torch.tensor(cond)).shape == (4, 8)
+    assert theirs.draw(torch.tensor(cond)).shape == (4, config.size)
 
 
-def test_torch_has_our_film_mlp():
+@pytest.mark.parametrize("tree_context", [False, True])
+def test_torch_has_our_film_mlp(tree_context):
     torch = pytest.importorskip("torch")
     import jax
     import jax.numpy as jnp
@@ -158,7 +160,12 @@ def test_torch_has_our_film_mlp():
 
     from jaxplan.config import SamplerConfig
 
-    config = SamplerConfig(denoiser="film_mlp", hidden=(16, 16), encoder=None)
+    config = SamplerConfig(
+        denoiser="film_mlp",
+        hidden=(16, 16),
+        encoder=None,
+        tree_context=tree_context,
+    )
     torch.manual_seed(0)
     theirs = TorchSampler(config)
     weights, dense = torch_weights(theirs)
