@@ -60,7 +60,7 @@ def main(args: Args) -> None:
     """Searches, prints tables, writes JSON."""
     start = time.perf_counter()
     study = RecordedStudy(args)
-    rows = np.flatnonzero(study.problems.blocked)
+    rows = np.flatnonzero(study.problems.blocked)[: 64 if args.quick else None]
     if study.weights("sampler") is None:
         raise ValueError(f"no sampler in {study.directory}")
     backbones = [each for each in BACKBONES if each.name in args.backbones]
@@ -83,6 +83,7 @@ def study_backbone(
 ) -> Iterator[Table]:
     """All ablations in one backbone."""
     sampler = study.weights("sampler")
+    shares = P_UNIFORM[::3] if study.args.quick else P_UNIFORM  # each is compiled
     config = planner(backbone, OURS_METHOD)
 
     def count(config: PlannerConfig = config, **changes: Any) -> Counts:
@@ -116,7 +117,7 @@ def study_backbone(
     )
     yield rated(
         "p_uniform",
-        {str(p): count(dataclasses.replace(config, p_uniform=p)) for p in P_UNIFORM},
+        {str(p): count(dataclasses.replace(config, p_uniform=p)) for p in shares},
         "1 = no learned proposals; without any uniform ones (0) the search is incomplete.",
     )
     yield rated(

@@ -31,6 +31,7 @@ from jaxplan.agent import BANK
 from jaxplan.cli import run_script
 from jaxplan.config import SamplerConfig
 from jaxplan.data import IMAGE_SHAPE
+from jaxplan.evaluation.study import RESULTS
 from jaxplan.evaluation.tables import Result, Table
 from jaxplan.learning import Weights, WeightsError, load_weights
 from jaxplan.learning.pretrained import DIRECTORY
@@ -61,7 +62,8 @@ class Args:
     quick: bool = False
     """50 proposals."""
     weights: Path = DIRECTORY
-    out: Path = Path("eval/results/proposal_time.json")
+    out: Path | None = None
+    """JSON; by default in `eval/results`, of a quick run in `runs`."""
 
 
 def main(args: Args) -> None:
@@ -106,8 +108,9 @@ def main(args: Args) -> None:
         seconds=time.perf_counter() - start,
     )
     result.show()
-    result.write(args.out)
-    print(f"written to {args.out}")
+    out = args.out or Path("runs" if args.quick else RESULTS) / "proposal_time.json"
+    result.write(out)
+    print(f"written to {out}")
 
 
 def shipped(directory: Path) -> tuple[dict[str, Weights], list[str]]:
