@@ -31,7 +31,7 @@ from jaxplan.agent import BANK
 from jaxplan.cli import run_script
 from jaxplan.config import SamplerConfig
 from jaxplan.data import IMAGE_SHAPE
-from jaxplan.evaluation.study import RESULTS
+from jaxplan.evaluation.study import results
 from jaxplan.evaluation.tables import Result, Table
 from jaxplan.learning import Weights, WeightsError, load_weights
 from jaxplan.learning.pretrained import DIRECTORY
@@ -108,7 +108,7 @@ def main(args: Args) -> None:
         seconds=time.perf_counter() - start,
     )
     result.show()
-    out = args.out or Path("runs" if args.quick else RESULTS) / "proposal_time.json"
+    out = args.out or results(args.quick) / "proposal_time.json"
     result.write(out)
     print(f"written to {out}")
 

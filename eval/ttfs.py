@@ -22,7 +22,7 @@ from jaxplan.agent import BANK
 from jaxplan.cli import run_script
 from jaxplan.config import PAPER_PLANNER
 from jaxplan.evaluation.memo import code_digest
-from jaxplan.evaluation.statistics import bootstrap, ratio_of_means
+from jaxplan.evaluation.statistics import ratio_of_means
 from jaxplan.evaluation.study import RecordedStudy, StudyArgs
 from jaxplan.evaluation.tables import Estimate, Result, Table
 from jaxplan.provenance import versions
@@ -200,9 +200,8 @@ def _ratio(
     times: np.ndarray, base: np.ndarray, solved: np.ndarray, base_solved: np.ndarray
 ) -> Estimate:
     """Of the means over the episodes that each solves, bootstrapped over episodes."""
-    ratio = ratio_of_means(times * solved, solved, base * base_solved, base_solved)
-    value = float(ratio(np.ones((1, len(times))))[0])
-    return Estimate(value, *bootstrap(ratio, np.arange(len(times))))
+    sides = times * solved, solved, base * base_solved, base_solved
+    return Estimate(*ratio_of_means(*sides, np.arange(len(times))))
 
 
 def _shortfalls(

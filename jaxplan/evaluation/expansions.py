@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from jaxplan.evaluation.statistics import bootstrap, ratio_of_means, wilson
+from jaxplan.evaluation.statistics import ratio_of_means, wilson
 from jaxplan.evaluation.tables import Estimate
 
 
@@ -50,11 +50,8 @@ def normalised(
         sides = [_trials(c, r) for c, r in ((counts, rows), (ours, own_rows))]
     else:
         sides = [(c.expansions * r, r) for c, r in ((counts, rows), (ours, own_rows))]
-    ratio = ratio_of_means(*sides[0], *sides[1])
-    size = len(sides[0][0])
-    group = np.arange(size) if whole_trials else counts.trial
-    value = float(ratio(np.ones((1, size)))[0])
-    return Estimate(value, *bootstrap(ratio, group))
+    groups = np.arange(len(sides[0][0])) if whole_trials else counts.trial
+    return Estimate(*ratio_of_means(*sides[0], *sides[1], groups))
 
 
 def _trials(counts: Counts, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -9,7 +9,6 @@ import hashlib
 import itertools
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Literal
 
 import jax
 import numpy as np
@@ -31,7 +30,6 @@ from jaxplan.tasks.mug.way import expert_planner
 
 SHARD = 32
 """Episodes a shard, in lockstep."""
-Predictor = Literal["network", "expert"]
 
 
 def record(

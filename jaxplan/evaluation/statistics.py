@@ -21,27 +21,6 @@ def wilson(successes: int, trials: int, z: float = 1.959964) -> tuple[float, flo
     return (middle - spread) / scale, (middle + spread) / scale
 
 
-def ratio_of_means(
-    total: np.ndarray, count: np.ndarray, own_total: np.ndarray, own_count: np.ndarray
-) -> Callable[[np.ndarray], np.ndarray]:
-    """A statistic for `bootstrap`: sum(total) / sum(count) over the same of another side.
-
-    Args:
-        total: [N] sums of each group, 0 where it does not count.
-        count: [N] how many observations each sum is of.
-        own_total: Of the side that the ratio is to.
-        own_count: Likewise.
-    """
-
-    def ratio(weights: np.ndarray) -> np.ndarray:
-        with np.errstate(divide="ignore", invalid="ignore"):
-            mean = (weights @ total) / (weights @ count.astype(float))
-            own = (weights @ own_total) / (weights @ own_count.astype(float))
-            return mean / own
-
-    return ratio
-
-
 def bootstrap(
     statistic: Callable[[np.ndarray], np.ndarray],
     groups: np.ndarray,
@@ -68,3 +47,33 @@ def bootstrap(
         return math.nan, math.nan
     low, high = np.quantile(values, [(1 - level) / 2, (1 + level) / 2])
     return float(low), float(high)
+
+
+def ratio_of_means(
+    total: np.ndarray,
+    count: np.ndarray,
+    own_total: np.ndarray,
+    own_count: np.ndarray,
+    groups: np.ndarray,
+) -> tuple[float, float, float]:
+    """sum(total) / sum(count) over the same of another side, with its bootstrap interval.
+
+    Args:
+        total: [N] sums, 0 where they do not count.
+        count: [N] how many observations each sum is of.
+        own_total: Of the side that the ratio is to.
+        own_count: Likewise.
+        groups: [N] as for `bootstrap`.
+
+    Returns:
+        The ratio, lower and upper end.
+    """
+
+    def ratio(weights: np.ndarray) -> np.ndarray:
+        with np.errstate(divide="ignore", invalid="ignore"):
+            mean = (weights @ total) / (weights @ count.astype(float))
+            own = (weights @ own_total) / (weights @ own_count.astype(float))
+            return mean / own
+
+    value = float(ratio(np.ones((1, len(total))))[0])
+    return value, *bootstrap(ratio, groups)

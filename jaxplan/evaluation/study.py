@@ -26,6 +26,11 @@ PIECE = 1024
 """Problems of a piece that is kept as soon as it is done."""
 
 
+def results(quick: bool) -> Path:
+    """Where a script's JSON goes, so that a quick run does not replace what was measured."""
+    return Path("runs") if quick else RESULTS
+
+
 @dataclass(frozen=True)
 class StudyArgs:
     """What problems, whose weights, where to."""
@@ -51,8 +56,7 @@ class StudyArgs:
 
     def path(self, name: str) -> Path:
         """Where the JSON goes."""
-        directory = Path("runs") if self.quick else RESULTS
-        return self.out or directory / f"{name}_{self.variant}.json"
+        return self.out or results(self.quick) / f"{name}_{self.variant}.json"
 
 
 class RecordedStudy:
