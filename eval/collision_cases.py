@@ -9,7 +9,7 @@ import numpy as np
 from peers import peer_model, slots_for
 
 from jaxplan.collision import Obstacle, World, make_world
-from jaxplan.collision.certify import carry, qpos_rows
+from jaxplan.collision.positions import carry, qpos_rows
 from jaxplan.evaluation.motion_bench import (
     Problem,
     obstacles_mjcf,

@@ -4,7 +4,7 @@ from collections import Counter
 
 import numpy as np
 
-from jaxplan.collision.certify import contacts_of
+from jaxplan.collision.oracle import contacts_of
 from jaxplan.collision.world import make_world
 from jaxplan.scene import Group, Scene
 
