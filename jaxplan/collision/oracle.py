@@ -208,6 +208,7 @@ def nearest(
 
 
 def names_of(scene: Scene, geoms: tuple[int, int] | None) -> tuple[str, str] | None:
+    """Both geoms by name."""
     return geoms and (scene.geom_name(geoms[0]), scene.geom_name(geoms[1]))
 
 
