@@ -48,6 +48,11 @@ class PlannerConfig:
     toggle_tie_break: float = 0.0
     """Nodes whose distances to the target differ by less than this [rad] count as tied, and the
     one nearer to q_toggle is the base of a learned proposal (section 4.3); 0 = off."""
+    balance: bool = True
+    """RRT-Connect's smaller tree grows until it has half of the other's nodes; off: in turn."""
+    dynamic_domain: float = 4.0
+    """Of a node whose motion was blocked: farther samples than this [rad] do not come to it, see
+    `planning.domain`; 0 = off."""
     metric: tuple[float, ...] | None = None
     """Diagonal of W in d(q, q') = |W (q - q')|; None = identity."""
     workers: int = 16
@@ -69,6 +74,8 @@ PAPER_PLANNER = PlannerConfig(
     max_expansions=500,
     step_min=0.05,
     step_max=0.2,
+    balance=False,
+    dynamic_domain=0.0,
     workers=1,
     margin=0.004,  # covers tracking errors
     edge_resolution=0.025,

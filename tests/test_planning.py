@@ -22,7 +22,8 @@ from planning_spheres import (
 
 from jaxplan.config import PAPER_PLANNER
 from jaxplan.planning import PlanResult, Segment, Status, lanes, make_planner, search
-from jaxplan.planning.edges import all_free, motions_free, points_for, stages
+from jaxplan.planning.edges import STAGES, all_free, motions_free, place, places, points_for
+from jaxplan.planning.space import Space
 from jaxplan.planning.state import Query
 
 METHODS = ("rrt", "rrt_connect")
@@ -47,18 +48,19 @@ def planner(config, d=7):
 
 @cache
 def _grown(config, d):
-    limits = jnp.full(d, -Q_MAX), jnp.full(d, Q_MAX)
+    space = Space.of(np.full(d, -Q_MAX), np.full(d, Q_MAX), None, config.metric)
+    go, rounds = jnp.array(False), jnp.int32(2**30)
 
     @jax.jit
     def grow(worlds, state, query, status, bank):
         def free(problem, q):
             return config_free(worlds, problem, q)
 
-        return lanes.run(state, query, status, bank, free, limits, config)
+        return lanes.run(state, query, status, bank, free, None, rounds, go, space, config)
 
     def begin(query):
-        query, status = search.examine(query, limits)
-        return lanes.begin(query, status, len(status), config), query, status
+        query, status = search.examine(query, space)
+        return lanes.begin(query, status, len(status), space, config), query, status
 
     return jax.jit(begin), grow
 
@@ -67,7 +69,8 @@ def searched_trees(config, worlds, q_start, q_goal, q_toggle, keys, draw):
     """The answers, and the trees that led to them."""
     begin, grow = _grown(config, q_start.shape[1])
     ends = (jnp.asarray(q) for q in (q_start, q_goal, q_toggle))
-    query = Query(*ends, keys, jnp.full(len(keys), jnp.inf))
+    goals = jnp.zeros((len(keys), 0, q_start.shape[1]))
+    query = Query(*ends, keys, jnp.full(len(keys), jnp.inf), goals)
     state, query, status = begin(query)
     waiting = np.ones(len(q_start), bool)
     while waiting.any():
@@ -85,10 +88,14 @@ def assert_same_answers(a, b):
 
 @pytest.mark.parametrize("points", [1, 2, 3, 8, 32, 33])
 def test_stages_are_all_places_once_and_the_end_first(points):
-    groups = stages(points)
-    assert groups[0].tolist() == [1.0]
-    every = np.sort(np.concatenate(groups)) * points
-    np.testing.assert_allclose(every, np.arange(1, points + 1), rtol=1e-6)
+    many = jnp.int32(points)
+    groups = [
+        [int(place(jnp.int32(s), jnp.int32(i), many)) for i in range(count)]
+        for s in range(STAGES)
+        if (count := int(places(jnp.int32(s), many)))
+    ]
+    assert groups[0] == [points]
+    assert sorted(sum(groups, [])) == list(range(1, points + 1))
 
 
 @pytest.mark.parametrize("rows", [4, 64])
@@ -105,7 +112,7 @@ def test_staged_checks_give_the_verdicts_of_all_checks(rows):
 
     def check(q0, q1):
         return motions_free(
-            free, jnp.asarray(problem), q0, q1, jnp.asarray(asked), 10, rows
+            free, jnp.asarray(problem), q0, q1, jnp.asarray(10 * asked), rows
         )
 
     verdicts, checks = (np.asarray(x) for x in jax.jit(check)(q0, q1))
