@@ -198,7 +198,7 @@ def rates(
     rows, where = list(np.eye(len(limits), d)), list(limits)
     for _, master, polycoef in dependent:
         slope = steepest(polycoef, where[master])
-        rows.append(np.where(rows[master] > 0, rows[master] * slope, 0))
+        rows.append(_times(rows[master], slope))
         where.append(image(polycoef, where[master]))
     return np.stack(rows)
 
@@ -216,5 +216,12 @@ def turns(dependent: Sequence[Dependent], free: int, d: int) -> np.ndarray:
     rows = list(np.eye(free, d))
     for _, master, polycoef in dependent:
         slope = np.nan if any(polycoef[2:]) else sum(polycoef[1:2])
-        rows.append(np.where(rows[master] == 0, 0, rows[master] * slope))
+        rows.append(_times(rows[master], slope))
     return np.stack(rows)
+
+
+def _times(row: np.ndarray, slope: float) -> np.ndarray:
+    """Their product; 0 times what is not finite is 0."""
+    return np.multiply(
+        row, slope, where=(row != 0) & (slope != 0), out=np.zeros_like(row)
+    )

@@ -5,7 +5,7 @@ from collections.abc import Iterable
 import mujoco
 
 from jaxplan.scene.chain import line
-from jaxplan.scene.loops import flex_bodies
+from jaxplan.scene.loops import flex_bodies, flex_name
 
 
 def refuse_flexes(model: mujoco.MjModel, movers: Iterable[int]) -> None:
@@ -36,10 +36,10 @@ def refuse_flexes(model: mujoco.MjModel, movers: Iterable[int]) -> None:
         if any(
             _meet(bits, theirs) and len(own | lines) > 1 for lines, theirs in others
         ):
-            name = model.flex(f).name or f"number {f}"
             raise ValueError(
-                f"flex {name!r} is a deformable body that the arm or something it may hold "
-                "can touch, which is not supported: set its contype and conaffinity to 0"
+                f"flex {flex_name(model, f)} is a deformable body that the arm or something "
+                "it may hold can touch, which is not supported: set its contype and "
+                "conaffinity to 0"
             )
 
 

@@ -58,7 +58,7 @@ def _extremes(p: Polynomial, interval: Interval) -> list[float]:
         np.sign(p.coef[-1]) * np.inf,
         np.sign(p.coef[-1]) * (-1) ** p.degree() * np.inf,
     ]
-    ends = [float(p(x)) if np.isfinite(x) else far[x < 0] for x in (low, high)]
+    ends = [float(p(x)) if np.isfinite(x) else far[bool(x < 0)] for x in (low, high)]
     return [*ends, *(float(p(x)) for x in inner)]
 
 

@@ -48,7 +48,7 @@ def refuse_loops(
         flex = int(model.eq_obj1id[e])
         if changes(model, flex_bodies(model, flex), moved):
             raise ValueError(
-                f"the equality constraint of flex {_called(model.flex(flex).name, flex)} "
+                f"the equality constraint of flex {flex_name(model, flex)} "
                 'depends on the arm\'s joints, which is not supported: give it active="false"'
             )
     tied = {
@@ -97,6 +97,11 @@ def flex_bodies(model: mujoco.MjModel, flex: int) -> set[int]:
         )
     )
     return {int(body) for body in (*vertices, *nodes) if body >= 0}
+
+
+def flex_name(model: mujoco.MjModel, flex: int) -> str:
+    """Its name in quotes, or its number."""
+    return _called(mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_FLEX, flex), flex)
 
 
 def _ends(model: mujoco.MjModel, equality: int) -> tuple[int, int]:
@@ -149,5 +154,5 @@ def _wrapped(model: mujoco.MjModel, wraps: range) -> Iterator[int]:
             yield -1
 
 
-def _called(name: str, number: int) -> str:
+def _called(name: str | None, number: int) -> str:
     return repr(name) if name else f"number {number}"
