@@ -147,8 +147,8 @@ def _in_tiles(
             return leaf[rows, columns if leaf.shape[-1] > 1 else 0]
 
         picked = jax.tree.map(one, cores._replace(vertices=()))
-        vertices = [x[:, rows, 0] for x in cores.vertices] if mesh else ()
-        return picked._replace(vertices=vertices)
+        vertices = (x[:, rows, 0] for x in cores.vertices if mesh)
+        return picked._replace(vertices=tuple(vertices))
 
     def search(state: tuple[jax.Array, jax.Array]) -> tuple[jax.Array, jax.Array]:
         done, values = state
@@ -162,7 +162,7 @@ def _in_tiles(
         found = function(Pair(one, other, offset, axes))
         return done + tile, values.at[places].set(found, mode="drop")
 
-    values = jnp.full(size, otherwise)
+    values = jnp.full(size, otherwise, cores.radius.dtype)
     start = jnp.array(0), values
     _, values = jax.lax.while_loop(lambda state: state[0] < count, search, start)
     return values.reshape(chosen.shape)

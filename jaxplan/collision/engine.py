@@ -71,7 +71,7 @@ def least_scores(scene: Scene, world: World, q: jax.Array, score: Score) -> jax.
         `[N]`.
     """
     if not scene.groups:
-        return jnp.full(q.shape[-1], jnp.inf)
+        return jnp.full(q.shape[-1], jnp.inf, q.dtype)
     fronts, pairs = _fronts(scene), _convex_pairs(scene)
     slots = {slot.geom: index for index, slot in enumerate(scene.slots)}
 
@@ -84,8 +84,7 @@ def least_scores(scene: Scene, world: World, q: jax.Array, score: Score) -> jax.
         own = in_world(shapes(front.facing, world), poses, np.array(front.links))
         function = CLOSED[front.kinds]
         if front.obstacles[0].ids[0] in slots:
-            (obstacles,) = front.obstacles
-            rows = [slots[geom] for geom in obstacles.ids]
+            rows = [slots[geom] for o in front.obstacles for geom in o.ids]
             return _least_over_slots(function, own, world, rows, score)
         frame = poses[scene.structure.link_of[front.obstacles[0].body]]
         near = seen_from(own, frame)
@@ -136,7 +135,7 @@ def _least_over_slots(
     function: Callable, own: Shapes, world: World, rows: list[int], score: Score
 ) -> jax.Array:
     """Least score `[n, B]` over slots of one kind, each seen from its own frame."""
-    still = jnp.zeros((1, 1))
+    still = jnp.zeros((1, 1), own.centre[0].dtype)
     axes = [[still + (i == k) for i in range(3)] for k in range(3)]
     rated = []
     # Written out: in a loop, XLA on CPU takes three times as long.

@@ -56,7 +56,10 @@ def config_free(
         `[...]` bool.
     """
     exact = backend == "mjx"
-    return _flat(scene, world, q, Score(exact, jnp.asarray(margin)), backend) > 0
+    return (
+        _flat(scene, world, q, Score(exact, jnp.asarray(margin, jnp.float32)), backend)
+        > 0
+    )
 
 
 def motion_free(
@@ -102,6 +105,7 @@ def _flat(
     scene: Scene, world: World, q: jax.Array, score: Score, backend: Backend
 ) -> jax.Array:
     """Flattens the batch, moves it to the last axis, and asks the backend."""
+    scene, world, q = jax.tree.map(_single, (scene, world, q))
     shape = batch_shape(world, q)
     finite = jnp.isfinite(q).all(-1)
     for pose in (world.object_pose, world.slot_pose):
@@ -117,6 +121,12 @@ def _flat(
     else:
         scores = least_distances(scene, flat, rows) - score.margin
     return jnp.where(finite, scores.reshape(shape), jnp.nan)
+
+
+def _single(leaf: jax.typing.ArrayLike) -> jax.Array:
+    """In float32, whatever the caller computes in; flags stay flags."""
+    leaf = jnp.asarray(leaf)
+    return leaf if leaf.dtype == bool else leaf.astype(jnp.float32)
 
 
 def _batch_last(leaf: jax.Array, shape: tuple[int, ...], own: int) -> jax.Array:
