@@ -75,17 +75,14 @@ def _attach(
     joint = np.array([link.joint for link in links])
     start = np.array([link.offset for link in links])
     slides = np.array([link.slides for link in links])[:, None]
-    turn = jnp.where(
-        start[:, None, None],
-        _matrices(model.body_quat[body]),
-        jnp.eye(3, dtype=q.dtype),
-    )
+    still = jnp.eye(3, dtype=q.dtype)
+    turn = jnp.where(start[:, None, None], _matrices(model.body_quat[body]), still)
     axis, anchor = model.jnt_axis[joint][..., None], model.jnt_pos[joint][..., None]
     middle = jnp.where(start[:, None], model.body_pos[body], 0)[..., None]
     value = _values(scene, world, q, links)
     angle, shift = jnp.where(slides, 0, value), jnp.where(slides, value, 0)
     # Rodrigues: R = turn (1 + sin K + (1 - cos) K^2), about the anchor.
-    cross = jnp.cross(axis, jnp.eye(3, dtype=q.dtype), axisa=1, axisc=1)
+    cross = jnp.cross(axis, still, axisa=1, axisc=1)
     constants = turn, turn @ cross, turn @ cross @ cross, anchor
     steps = (
         jnp.array(rows),

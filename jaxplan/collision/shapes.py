@@ -29,7 +29,8 @@ class Score(NamedTuple):
     """True: signed distance [m]. False: only the sign of distance - margin counts,
     which spares the square root and what happens inside a box."""
     margin: jax.Array | float = 0.0
-    """[m], at least 0; subtracted."""
+    """[m], at least 0; subtracted. One for all; or of each geom that faces obstacles
+    `[n, B]`, of each convex pair `[P, B]`."""
 
     def of_squared(self, squared: jax.Array, radius: jax.Array | float) -> jax.Array:
         """Rates a squared distance between cores that are `radius` thick together."""
