@@ -22,7 +22,8 @@ import numpy as np
 
 from jaxplan.scene.chain import line
 from jaxplan.scene.contacts import geom_pairs
-from jaxplan.scene.names import known
+from jaxplan.scene.excludes import ALWAYS, Exclude, Excluded
+from jaxplan.scene.names import geom_name, known
 from jaxplan.scene.source import SLOTS, compile_model
 from jaxplan.scene.structure import Group, Slot, Structure, read_structure
 
@@ -60,6 +61,7 @@ class Scene:
         joints: Sequence[str] | None = None,
         hand: str | None = None,
         slots: Mapping[str, int] | None = None,
+        exclude: Exclude = ALWAYS,
     ) -> "Scene":
         """Reads a scene.
 
@@ -75,6 +77,10 @@ class Scene:
             slots: Room for obstacles that change between queries: how many of each kind
                 (sphere, capsule, cylinder, ellipsoid, box), such as `{"box": 16}`. They
                 can touch whatever can touch anything.
+            exclude: Contacts to leave out, besides those that the model excludes:
+                "always_touching", geoms that overlap wherever the arm is (neighbouring
+                links, often; never objects and slots), which `excluded` lists; pairs of
+                bodies, ("hand", "mug") or "hand|mug"; a list of both; or None.
 
         Raises:
             FileNotFoundError: There is no such file.
@@ -87,7 +93,7 @@ class Scene:
         model = compile_model(source, slots)
         numbers = Numbers(*(jnp.asarray(getattr(model, f)) for f in Numbers._fields))
         names = SLOTS if any(slots.values()) else None
-        return cls(numbers, read_structure(model, joints, hand, names))
+        return cls(numbers, read_structure(model, joints, hand, names, exclude))
 
     def replace(self, **fields: jax.Array) -> "Scene":
         """The scene with some of its `Numbers` replaced, e.g. `geom_pos`.
@@ -100,7 +106,9 @@ class Scene:
             turned = copy.copy(self.mj_model)
             turned.geom_quat[:] = np.asarray(fields["geom_quat"])
             slots = SLOTS if self.slots else None
-            structure = read_structure(turned, self.joints, self.hand, slots)
+            structure = read_structure(
+                turned, self.joints, self.hand, slots, structure.excludes
+            )
         return Scene(self.model._replace(**fields), structure)
 
     @property
@@ -142,6 +150,11 @@ class Scene:
     def groups(self) -> tuple[Group, ...]:
         """Contacts by pair of bodies, after MuJoCo's filter."""
         return self.structure.groups
+
+    @property
+    def excluded(self) -> tuple[Excluded, ...]:
+        """Contacts that are left out besides the model's own, and why."""
+        return self.structure.excludes.rows
 
     @property
     def q_min(self) -> jax.Array:
@@ -226,7 +239,4 @@ class Scene:
 
     def geom_name(self, geom: int) -> str:
         """A geom's name; body[number] where it has none."""
-        model = self.mj_model
-        body = model.geom_bodyid[geom]
-        number = geom - model.body_geomadr[body]
-        return model.geom(geom).name or f"{self.structure.body_names[body]}[{number}]"
+        return geom_name(self.mj_model, self.structure.body_names, geom)

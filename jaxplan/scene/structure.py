@@ -2,14 +2,17 @@
 
 import dataclasses
 from collections.abc import Sequence
+from functools import cached_property
 from typing import NamedTuple
 
 import mujoco
 import numpy as np
 
 from jaxplan.scene.chain import SIMPLE_JOINTS, arm_joints, last_body, line
-from jaxplan.scene.contacts import Contact, find_contacts, kind_of
+from jaxplan.scene.contacts import Contact, find_contacts, geom_pairs, kind_of
+from jaxplan.scene.excludes import Exclude, Excludes, find_excludes
 from jaxplan.scene.names import known, names_of
+from jaxplan.scene.touching import near_distances
 
 
 class Link(NamedTuple):
@@ -65,11 +68,25 @@ class Structure:
     hand: str
     slots: tuple[Slot, ...]
     groups: tuple[Group, ...]
+    excludes: Excludes
     links: tuple[Link, ...]
     """Links that collision needs, row 1 first (row 0 is the world). Parents stand before
     children, then the movable objects, which the hand may hold, then what hangs on them."""
     link_of: dict[int, int]
     """Row of a body's frame, by body id."""
+
+    @cached_property
+    def near(self) -> dict[tuple[int, int], float]:
+        """Geoms `(i, j)`, i < j, of neighbours that are hardly ever farther apart than so [m].
+
+        A margin at least as large counts as none for them: no pose keeps it.
+        """
+        arm = [self.joint_names.index(name) for name in self.joints]
+        contacts = [
+            c for group in self.groups if not group.held for c in group.contacts
+        ]
+        pairs = [pair for contact in contacts for pair in geom_pairs(contact)]
+        return near_distances(self.mj_model, arm, pairs)
 
 
 def read_structure(
@@ -77,6 +94,7 @@ def read_structure(
     joints: Sequence[str] | None,
     hand: str | None,
     slots: str | None = None,
+    exclude: Exclude | Excludes = None,
 ) -> Structure:
     """Reads names, tree and contacts; `Scene.from_mjcf` says what None means.
 
@@ -85,6 +103,7 @@ def read_structure(
         joints: The arm's.
         hand: A body.
         slots: The body whose geoms are slots.
+        exclude: Contacts to leave out, or what was found to be left out.
 
     Raises:
         ValueError: A joint or body is not in the model, or cannot be planned for.
@@ -113,7 +132,10 @@ def read_structure(
         int(b) for b in model.jnt_bodyid[model.jnt_type == mujoco.mjtJoint.mjJNT_FREE]
     ]
     mocap = [int(b) for b in np.flatnonzero(model.body_mocapid >= 0)]
-    groups = _groups(model, bodies, moved, free)
+    if not isinstance(exclude, Excludes):
+        apart = [*free, *mocap, *([bodies.index(slots)] if slots else ())]
+        exclude = find_excludes(model, bodies, arm, apart, exclude)
+    groups = _groups(model, bodies, moved, free, exclude)
     needed = {bodies.index(hand)}
     for group in groups:
         needed |= {side.body for contact in group.contacts for side in contact}
@@ -135,13 +157,18 @@ def read_structure(
             if bodies[body] == slots
         ),
         groups=groups,
+        excludes=exclude,
         links=links,
         link_of=link_of,
     )
 
 
 def _groups(
-    model: mujoco.MjModel, names: tuple[str, ...], arm: set[int], free: list[int]
+    model: mujoco.MjModel,
+    names: tuple[str, ...],
+    arm: set[int],
+    free: list[int],
+    excludes: Excludes,
 ) -> tuple[Group, ...]:
     """Contacts by pair of bodies.
 
@@ -153,9 +180,10 @@ def _groups(
         names: Of bodies, by id.
         arm: Bodies that the arm's joints move first.
         free: Bodies with a free joint: objects that can be held.
+        excludes: What is left out.
     """
     named: dict[str, list[Contact]] = {}
-    for contact in find_contacts(model):
+    for contact in find_contacts(model, excludes.geoms):
         name = "|".join(sorted(names[side.body] for side in contact))
         named.setdefault(name, []).append(contact)
     groups = []

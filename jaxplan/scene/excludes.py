@@ -1,0 +1,87 @@
+"""Which contacts are left out besides the model's own, and why."""
+
+from collections.abc import Iterable, Sequence
+from itertools import product
+from typing import NamedTuple
+
+import mujoco
+
+from jaxplan.scene.names import geom_name, known
+from jaxplan.scene.touching import always_touching
+
+ALWAYS = "always_touching"
+"""Stands for what `always_touching` finds."""
+
+Exclude = str | Iterable[str | Sequence[str]] | None
+"""`ALWAYS`, pairs of bodies ("hand|mug" or ("hand", "mug")), both, or None."""
+
+
+class Excluded(NamedTuple):
+    """A contact that is left out."""
+
+    a: str
+    """A geom that always touches the other, or a body that was given."""
+    b: str
+    why: str
+
+
+class Excludes(NamedTuple):
+    """What is left out of a model's contacts."""
+
+    rows: tuple[Excluded, ...]
+    geoms: frozenset[tuple[int, int]]
+    """Pairs `(i, j)` of geom ids, i < j."""
+
+
+def find_excludes(
+    model: mujoco.MjModel,
+    bodies: tuple[str, ...],
+    arm: Sequence[int],
+    apart: Iterable[int],
+    exclude: Exclude,
+) -> Excludes:
+    """What is left out.
+
+    Args:
+        model: The model.
+        bodies: Names by id.
+        arm: Ids of the arm's joints.
+        apart: Bodies that queries place: objects, and that of the slots.
+        exclude: See `Scene.from_mjcf`.
+
+    Raises:
+        ValueError: There is no such body, or a word means nothing here.
+    """
+    entries = [exclude] if isinstance(exclude, str) else list(exclude or ())
+    rows, geoms = [], set()
+    for entry in dict.fromkeys(e for e in entries if e != ALWAYS):
+        names = _two_bodies(entry, bodies)
+        rows.append(Excluded(*names, "given"))
+        a, b = (bodies.index(name) for name in names)
+        geoms |= {tuple(sorted(pair)) for pair in product(*_geoms(model, a, b))}
+    if ALWAYS in entries:
+        found = always_touching(model, arm, apart)
+        for pair, share in found.items():
+            if pair not in geoms:
+                why = f"touch in {100 * share:.3g} % of random poses"
+                i, j = (geom_name(model, bodies, geom) for geom in pair)
+                rows.append(Excluded(i, j, why))
+        geoms |= set(found)
+    return Excludes(tuple(rows), frozenset(geoms))
+
+
+def _two_bodies(entry: str | Sequence[str], bodies: tuple[str, ...]) -> tuple[str, str]:
+    """The bodies of a pair."""
+    names = entry.split("|") if isinstance(entry, str) else tuple(entry)
+    if len(names) != 2:
+        raise ValueError(
+            f"exclude {entry!r}: say {ALWAYS!r}, 'body|body' or ('body', 'body')"
+        )
+    a, b = (known(name, "body", bodies) for name in names)
+    return a, b
+
+
+def _geoms(model: mujoco.MjModel, *bodies: int) -> list[range]:
+    """Ids of the geoms of each body."""
+    first, count = model.body_geomadr, model.body_geomnum
+    return [range(first[b], first[b] + count[b]) for b in bodies]

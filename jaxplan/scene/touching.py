@@ -1,0 +1,231 @@
+"""Geoms that touch wherever the arm is, by C MuJoCo: contacts that say nothing.
+
+Collision shapes are simpler than the robot, so neighbouring ones often overlap for good:
+every question would answer START_IN_COLLISION. Which pairs may be left out for that is a
+question of safety, for what is left out is not checked:
+
+    both moved by the arm, or neighbours      if they touch in every random pose
+    neighbours of one robot                   if they touch in nearly every random pose
+    with an object or a slot                  never: a query may put it elsewhere
+
+Neighbours have at most one other body with geoms between them in the kinematic tree. Of
+what stands still, only the body that carries the arm belongs to the robot: a wall that the
+upper arm hits in most poses is an obstacle, a door beside the robot is no neighbour, and
+the hull of a room around it still stops its hand. A pose in a key frame proves nothing: a
+folded arm rests on itself, and must not fall through itself later.
+"""
+
+import copy
+from collections import Counter
+from collections.abc import Callable, Iterable, Sequence
+from functools import cache
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+
+from jaxplan.scene.chain import SIMPLE_JOINTS, line
+
+TOUCH = 1e-4
+"""Distances below this are contact: surfaces that lie on each other are apart by rounding [m]."""
+POSES = 400
+"""Random poses, besides the reference and the key frames."""
+OFTEN = 0.9
+"""Share of poses from which on neighbours of a robot count as always touching."""
+NEIGHBOURS = 2
+"""Steps between bodies with geoms that still make neighbours: one other stands between."""
+CLOSE = 0.03
+"""Distances of neighbours beyond this say nothing [m]."""
+
+
+class Kinship(NamedTuple):
+    """How two geoms belong together."""
+
+    moved: bool
+    """A joint of the arm moves one and not the other."""
+    both: bool
+    """Joints of the arm move both."""
+    neighbours: bool
+    robot: bool
+    """Neighbours of one robot: neither only stands in the world."""
+
+
+def always_touching(
+    model: mujoco.MjModel, arm: Sequence[int], apart: Iterable[int]
+) -> dict[tuple[int, int], float]:
+    """Pairs of geoms that leave nothing to plan, and the share of poses in which they touch.
+
+    Args:
+        model: The model; joints that are not the arm's are drawn at random as well.
+        arm: Ids of its joints.
+        apart: Bodies that queries place: objects, and that of the slots.
+    """
+    kin, apart = kinships(model, arm), set(apart)
+    model = _bare(model)
+    for body in apart & set(np.flatnonzero(model.body_weldid == 0).tolist()):
+        model.geom_pos[model.geom_bodyid == body] = 1000.0  # slots: out of the way
+    data, touches = mujoco.MjData(model), Counter()
+    rows = _poses(model, POSES)
+    for qpos in rows:
+        touches.update(_touching(model, data, qpos))
+    shares = {}
+    for pair, count in touches.items():
+        i, j = pair
+        placed = {int(model.geom_bodyid[g]) for g in pair}
+        if any(apart & {body, *line(model, body)} for body in placed):
+            continue
+        own = kin(i, j)
+        always = count == len(rows) and (own.both or own.neighbours)
+        often = count >= OFTEN * len(rows) and own.robot
+        if own.moved and (always or often):
+            shares[pair] = count / len(rows)
+    return shares
+
+
+def near_distances(
+    model: mujoco.MjModel, arm: Sequence[int], pairs: Iterable[tuple[int, int]]
+) -> dict[tuple[int, int], float]:
+    """Neighbours of the robot that are nearly always close, and how close [m].
+
+    Args:
+        model: The model.
+        arm: Ids of its joints.
+        pairs: Of geoms that are checked.
+
+    Returns:
+        `(i, j)`, i < j: the distance that `OFTEN` of the poses keep below, up to `CLOSE`.
+    """
+    kin = kinships(model, arm)
+    plane = mujoco.mjtGeom.mjGEOM_PLANE
+    found = {
+        (min(pair), max(pair)): []
+        for pair in pairs
+        if kin(*pair).moved
+        and kin(*pair).robot
+        and plane not in model.geom_type[list(pair)]
+    }
+    model = _bare(model)
+    data, rows = mujoco.MjData(model), _poses(model, POSES // 4)
+    misses, allowed = Counter(), (1 - OFTEN) * len(rows)
+    for qpos in rows if found else ():
+        touching = _touching(model, data, qpos)
+        for pair in [pair for pair in found if misses[pair] <= allowed]:
+            distance = mujoco.mj_geomDistance(model, data, *pair, CLOSE, None)
+            # It takes some meshes that are apart for overlapping; contacts know better.
+            doubtful = distance < 0 and pair not in touching
+            misses[pair] += doubtful or distance >= CLOSE
+            found[pair].append(max(distance, 0.0))
+    return {
+        pair: float(np.quantile(distances, OFTEN))
+        for pair, distances in found.items()
+        if misses[pair] <= allowed
+    }
+
+
+def kinships(
+    model: mujoco.MjModel, arm: Sequence[int]
+) -> Callable[[int, int], Kinship]:
+    """A function of two geoms.
+
+    Args:
+        model: The model.
+        arm: Ids of its joints.
+    """
+    weld = model.body_weldid
+    can = (model.geom_contype != 0) | (model.geom_conaffinity != 0)
+    can[model.pair_geom1] = can[model.pair_geom2] = True
+    bodies = set(model.geom_bodyid[can].tolist())
+    solid = {0, *weld[list(bodies)].tolist()}
+    heads = set(weld[model.jnt_bodyid[list(arm)]].tolist())
+
+    @cache
+    def above(body: int) -> list[int]:
+        """Rigid bodies from this one up, 0 = what stands still; only those with geoms."""
+        rigid = dict.fromkeys(int(weld[b]) for b in (*line(model, body), 0))
+        return [b for b in rigid if b in solid]
+
+    @cache
+    def joints(body: int) -> set[int]:
+        """Rigid bodies from this one up on which joints of the arm are."""
+        return heads & {int(weld[b]) for b in line(model, body)}
+
+    @cache
+    def carrier(body: int) -> int:
+        """What stands still and carries the body, 0 = nothing but the world."""
+        still = (b for b in line(model, body) if not weld[b] and b in bodies)
+        return next(still, 0)
+
+    @cache
+    def kinship(a: int, b: int) -> Kinship:
+        ways = above(a), above(b)
+        meet = next(x for x in ways[0] if x in ways[1])
+        steps = [way.index(meet) for way in ways]
+        one = meet != 0 or 0 in steps or 0 != carrier(a) == carrier(b)
+        neighbours = sum(steps) <= NEIGHBOURS and one
+        base = all(x and x == carrier(y) for x, y in ((a, b), (b, a)) if not weld[x])
+        return Kinship(
+            moved=joints(a) != joints(b),
+            both=bool(joints(a) and joints(b)),
+            neighbours=neighbours,
+            robot=neighbours and base,
+        )
+
+    body = model.geom_bodyid
+    return lambda i, j: kinship(int(body[i]), int(body[j]))
+
+
+def _bare(model: mujoco.MjModel) -> mujoco.MjModel:
+    """The model with contacts where geoms are closer than `TOUCH`, and nowhere else."""
+    model = copy.copy(model)
+    flags = mujoco.mjtDisableBit
+    model.opt.disableflags |= flags.mjDSBL_MIDPHASE
+    model.opt.disableflags &= ~(flags.mjDSBL_CONTACT | flags.mjDSBL_CONSTRAINT)
+    model.opt.enableflags = 0
+    for margin in (model.geom_margin, model.body_margin, model.pair_margin):
+        margin[:] = TOUCH
+    model.geom_gap[:] = model.pair_gap[:] = 0
+    return model
+
+
+def _touching(
+    model: mujoco.MjModel, data: mujoco.MjData, qpos: np.ndarray
+) -> set[tuple[int, int]]:
+    """Pairs of geoms `(i, j)`, i < j, that are closer than `TOUCH`."""
+    data.qpos[:] = qpos
+    mujoco.mj_kinematics(model, data)
+    mujoco.mj_collision(model, data)
+    close = data.contact.geom[data.contact.dist < TOUCH]
+    return {(i, j) for i, j in np.sort(close, -1).tolist()}
+
+
+def _poses(model: mujoco.MjModel, count: int) -> np.ndarray:
+    """`[n, nq]`: random hinges and slides, the reference and key frames if within limits."""
+    simple = np.flatnonzero(np.isin(model.jnt_type, SIMPLE_JOINTS))
+    limited = model.jnt_limited[simple] != 0
+    low, high = (
+        np.where(limited, model.jnt_range[simple, side], (-np.pi, np.pi)[side])
+        for side in (0, 1)
+    )
+    where = model.jnt_qposadr[simple]
+    rows = np.tile(model.qpos0, (count, 1))
+    rows[:, where] = np.random.default_rng(0).uniform(low, high, (count, len(low)))
+    named = np.concatenate([model.qpos0[None], model.key_qpos])
+    inside = (named[:, where] >= low) & (named[:, where] <= high)
+    rows = np.concatenate([rows, named[inside.all(-1)]])
+    for e in np.flatnonzero(model.eq_type == mujoco.mjtEq.mjEQ_JOINT):
+        if model.eq_active0[e]:
+            joints = model.eq_obj1id[e], model.eq_obj2id[e]
+            rows[:, model.jnt_qposadr[joints[0]]] = _follow(model, rows, *joints, e)
+    return rows
+
+
+def _follow(
+    model: mujoco.MjModel, rows: np.ndarray, slave: int, master: int, e: int | np.intp
+) -> np.ndarray:
+    """`[n]` positions of a joint that an equality ties to another, or to a constant."""
+    x = np.zeros(len(rows))
+    if master >= 0:
+        address = model.jnt_qposadr[master]
+        x = rows[:, address] - model.qpos0[address]
+    own = model.qpos0[model.jnt_qposadr[slave]]
+    return own + np.polynomial.polynomial.polyval(x, model.eq_data[e, :5])
