@@ -62,7 +62,7 @@ def test_neighbours_that_nearly_always_touch_are_left_out():
     flange = '<geom name="flange" size=".073" pos=".1 0 -.25"/>'
     scene = Scene.from_mjcf(arm(hand=flange))
     (why,) = (row.why for row in scene.excluded if set(row[:2]) == {"flange", "l2"})
-    assert 90 < float(why.split()[2]) < 100
+    assert 70 < float(why.split()[2]) < 100
     # l1 has two bodies between, the base three: such contacts are the question's.
     assert {frozenset({"flange", other}) for other in ("l1", "base")} <= pairs(scene)
 

@@ -25,7 +25,9 @@ from jaxplan.scene.contacts import geom_pairs
 from jaxplan.scene.excludes import ALWAYS, Exclude, Excluded
 from jaxplan.scene.names import geom_name, known
 from jaxplan.scene.source import SLOTS, compile_model
+from jaxplan.scene.srdf import read_srdf
 from jaxplan.scene.structure import Group, Slot, Structure, read_structure
+from jaxplan.scene.urdf import read_urdf
 
 
 class Numbers(NamedTuple):
@@ -94,6 +96,43 @@ class Scene:
         numbers = Numbers(*(jnp.asarray(getattr(model, f)) for f in Numbers._fields))
         names = SLOTS if any(slots.values()) else None
         return cls(numbers, read_structure(model, joints, hand, names, exclude))
+
+    @classmethod
+    def from_urdf(
+        cls,
+        path: str | PathLike,
+        srdf: str | PathLike | None = None,
+        joints: str | Sequence[str] | None = None,
+        hand: str | None = None,
+        slots: Mapping[str, int] | None = None,
+        exclude: Exclude = ALWAYS,
+        meshes: str | PathLike | None = None,
+    ) -> "Scene":
+        """Reads a robot as ROS has it: its collision shapes, with its root link fixed.
+
+        Mimic joints follow theirs, continuous joints have no limits.
+
+        Args:
+            path: Of the URDF.
+            srdf: Of the SRDF: links whose collisions it disables are left out.
+            joints: As for `from_mjcf`; a string: the SRDF's group of that name.
+            hand: See `from_mjcf`.
+            slots: See `from_mjcf`.
+            exclude: See `from_mjcf`.
+            meshes: Folder of packages, or of the meshes; None: the URDF's own and those
+                above it.
+
+        Raises:
+            FileNotFoundError: There is no such file, or a mesh that is not found.
+            ValueError: As for `from_mjcf`; there is no such group; MuJoCo cannot read a
+                mesh.
+        """
+        spec = read_urdf(path, meshes)
+        disabled, groups = ((), {}) if srdf is None else read_srdf(srdf, spec)
+        if isinstance(joints, str):
+            joints = groups[known(joints, "group", list(groups))]
+        given = [exclude] if isinstance(exclude, str) else exclude or ()
+        return cls.from_mjcf(spec, joints, hand, slots, [*given, *disabled])
 
     def replace(self, **fields: jax.Array) -> "Scene":
         """The scene with some of its `Numbers` replaced, e.g. `geom_pos`.

@@ -5,7 +5,7 @@ every question would answer START_IN_COLLISION. Which pairs may be left out for 
 question of safety, for what is left out is not checked:
 
     both moved by the arm, or neighbours      if they touch in every random pose
-    neighbours of one robot                   if they touch in nearly every random pose
+    neighbours of one robot                   if they touch in most random poses
     with an object or a slot                  never: a query may put it elsewhere
 
 Neighbours have at most one other body with geoms between them in the kinematic tree. Of
@@ -30,10 +30,13 @@ TOUCH = 1e-4
 """Distances below this are contact: surfaces that lie on each other are apart by rounding [m]."""
 POSES = 400
 """Random poses, besides the reference and the key frames."""
-OFTEN = 0.9
-"""Share of poses from which on neighbours of a robot count as always touching."""
+OFTEN = 0.7
+"""Share of poses from which on neighbours of a robot count as always touching: of published
+robots, the tubes of a telescope reach 0.73 to 0.75, arms that can hit their torso 0.56."""
 NEIGHBOURS = 2
 """Steps between bodies with geoms that still make neighbours: one other stands between."""
+NEARLY = 0.9
+"""Share of poses in which neighbours that are always near keep below a distance."""
 CLOSE = 0.03
 """Distances of neighbours beyond this say nothing [m]."""
 
@@ -93,7 +96,7 @@ def near_distances(
         pairs: Of geoms that are checked.
 
     Returns:
-        `(i, j)`, i < j: the distance that `OFTEN` of the poses keep below, up to `CLOSE`.
+        `(i, j)`, i < j: the distance that `NEARLY` all poses keep below, up to `CLOSE`.
     """
     kin = kinships(model, arm)
     plane = mujoco.mjtGeom.mjGEOM_PLANE
@@ -106,7 +109,7 @@ def near_distances(
     }
     model = _bare(model)
     data, rows = mujoco.MjData(model), _poses(model, POSES // 4)
-    misses, allowed = Counter(), (1 - OFTEN) * len(rows)
+    misses, allowed = Counter(), (1 - NEARLY) * len(rows)
     for qpos in rows if found else ():
         touching = _touching(model, data, qpos)
         for pair in [pair for pair in found if misses[pair] <= allowed]:
@@ -116,7 +119,7 @@ def near_distances(
             misses[pair] += doubtful or distance >= CLOSE
             found[pair].append(max(distance, 0.0))
     return {
-        pair: float(np.quantile(distances, OFTEN))
+        pair: float(np.quantile(distances, NEARLY))
         for pair, distances in found.items()
         if misses[pair] <= allowed
     }
