@@ -149,7 +149,7 @@ def test_pairs_of_bodies_are_given_in_either_form(exclude):
     [
         ("always", r"exclude 'always': say 'always_touching', 'body\|body' or"),
         ([("l1", "l2", "l3")], r"exclude \('l1', 'l2', 'l3'\): say"),
-        (["a|b|c"], r"exclude 'a\|b\|c': say"),
+        (["a|b|c"], r"'a\|b\|c' is no pair of bodies"),
         (["l1|l33"], "no body 'l33': did you mean 'l3'"),
     ],
 )

@@ -11,7 +11,7 @@ kind on another, because a rectangle is one array expression in the collision en
 Boxes in one rectangle are parallel as well: the engine turns the points once for all.
 """
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterable
 from itertools import combinations, product
 from typing import NamedTuple
 
@@ -82,6 +82,22 @@ def find_contacts(
 def geom_pairs(contact: Contact) -> list[tuple[int, int]]:
     """The pairs of geom ids that a rectangle stands for."""
     return list(product(contact.a.ids, contact.b.ids))
+
+
+def refuse_unsupported(model: mujoco.MjModel, contacts: Iterable[Contact]) -> None:
+    """Names a geom that planning cannot check, rather than to look past it.
+
+    Raises:
+        ValueError: A contact is of such a geom.
+    """
+    for side in (side for contact in contacts for side in contact):
+        if side.kind in ("hfield", "sdf"):
+            name = model.geom(side.ids[0]).name or f"geom {side.ids[0]}"
+            long = {"hfield": "a height field", "sdf": "a signed distance field"}
+            raise ValueError(
+                f"{name!r} is {long[side.kind]}, which is not supported: use a mesh or "
+                "boxes, or set its contype and conaffinity to 0"
+            )
 
 
 def _without(contact: Contact, excluded: Collection[tuple[int, int]]) -> list[Contact]:

@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import mujoco
 
-from jaxplan.scene.names import geom_name, known
-from jaxplan.scene.touching import always_touching
+from jaxplan.scene.names import geom_name, pair_of
+from jaxplan.scene.touching import Motion, always_touching
 
 ALWAYS = "always_touching"
 """Stands for what `always_touching` finds."""
@@ -36,7 +36,7 @@ class Excludes(NamedTuple):
 def find_excludes(
     model: mujoco.MjModel,
     bodies: tuple[str, ...],
-    arm: Sequence[int],
+    motion: Motion,
     apart: Iterable[int],
     exclude: Exclude,
 ) -> Excludes:
@@ -45,7 +45,7 @@ def find_excludes(
     Args:
         model: The model.
         bodies: Names by id.
-        arm: Ids of the arm's joints.
+        motion: What moves.
         apart: Bodies that queries place: objects, and that of the slots.
         exclude: See `Scene.from_mjcf`.
 
@@ -60,7 +60,7 @@ def find_excludes(
         a, b = (bodies.index(name) for name in names)
         geoms |= {tuple(sorted(pair)) for pair in product(*_geoms(model, a, b))}
     if ALWAYS in entries:
-        found = always_touching(model, arm, apart)
+        found = always_touching(model, motion, apart)
         for pair, share in found.items():
             if pair not in geoms:
                 why = f"touch in {100 * share:.3g} % of random poses"
@@ -72,13 +72,14 @@ def find_excludes(
 
 def _two_bodies(entry: str | Sequence[str], bodies: tuple[str, ...]) -> tuple[str, str]:
     """The bodies of a pair."""
-    names = entry.split("|") if isinstance(entry, str) else tuple(entry)
-    if len(names) != 2:
+    parts = entry.split("|") if isinstance(entry, str) else entry
+    if isinstance(entry, str) and len(parts) > 2:
+        return pair_of(entry, bodies, ())  # bodies with | in their names
+    if len(parts) != 2:
         raise ValueError(
             f"exclude {entry!r}: say {ALWAYS!r}, 'body|body' or ('body', 'body')"
         )
-    a, b = (known(name, "body", bodies) for name in names)
-    return a, b
+    return pair_of((parts[0], parts[1]), bodies, ())
 
 
 def _geoms(model: mujoco.MjModel, *bodies: int) -> list[range]:

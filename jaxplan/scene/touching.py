@@ -17,14 +17,15 @@ folded arm rests on itself, and must not fall through itself later.
 
 import copy
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable
 from functools import cache
 from typing import NamedTuple
 
 import mujoco
 import numpy as np
 
-from jaxplan.scene.chain import SIMPLE_JOINTS, line
+from jaxplan.scene.chain import line
+from jaxplan.scene.dependent import Dependent, follow
 
 TOUCH = 1e-4
 """Distances below this are contact: surfaces that lie on each other are apart by rounding [m]."""
@@ -41,6 +42,16 @@ CLOSE = 0.03
 """Distances of neighbours beyond this say nothing [m]."""
 
 
+class Motion(NamedTuple):
+    """What moves in a model; see `Structure`."""
+
+    moved: frozenset[int]
+    """Bodies that the arm moves first."""
+    variables: tuple[int, ...]
+    """Joint ids, the dependent ones last."""
+    dependent: tuple[Dependent, ...]
+
+
 class Kinship(NamedTuple):
     """How two geoms belong together."""
 
@@ -54,28 +65,28 @@ class Kinship(NamedTuple):
 
 
 def always_touching(
-    model: mujoco.MjModel, arm: Sequence[int], apart: Iterable[int]
+    model: mujoco.MjModel, motion: Motion, apart: Iterable[int]
 ) -> dict[tuple[int, int], float]:
     """Pairs of geoms that leave nothing to plan, and the share of poses in which they touch.
 
     Args:
-        model: The model; joints that are not the arm's are drawn at random as well.
-        arm: Ids of its joints.
+        model: The model.
+        motion: What moves; passive joints are drawn at random as the arm's are.
         apart: Bodies that queries place: objects, and that of the slots.
     """
-    kin, apart = kinships(model, arm), set(apart)
+    kin, apart = kinships(model, motion.moved), set(apart)
     model = _bare(model)
     for body in apart & set(np.flatnonzero(model.body_weldid == 0).tolist()):
         model.geom_pos[model.geom_bodyid == body] = 1000.0  # slots: out of the way
     data, touches = mujoco.MjData(model), Counter()
-    rows = _poses(model, POSES)
+    rows = _poses(model, motion, POSES)
     for qpos in rows:
         touches.update(_touching(model, data, qpos))
     shares = {}
     for pair, count in touches.items():
         i, j = pair
-        placed = {int(model.geom_bodyid[g]) for g in pair}
-        if any(apart & {body, *line(model, body)} for body in placed):
+        lines = [{int(b), *line(model, b)} for b in model.geom_bodyid[[i, j]]]
+        if apart & (lines[0] ^ lines[1]):
             continue
         own = kin(i, j)
         always = count == len(rows) and (own.both or own.neighbours)
@@ -86,19 +97,19 @@ def always_touching(
 
 
 def near_distances(
-    model: mujoco.MjModel, arm: Sequence[int], pairs: Iterable[tuple[int, int]]
+    model: mujoco.MjModel, motion: Motion, pairs: Iterable[tuple[int, int]]
 ) -> dict[tuple[int, int], float]:
     """Neighbours of the robot that are nearly always close, and how close [m].
 
     Args:
         model: The model.
-        arm: Ids of its joints.
+        motion: What moves.
         pairs: Of geoms that are checked.
 
     Returns:
         `(i, j)`, i < j: the distance that `NEARLY` all poses keep below, up to `CLOSE`.
     """
-    kin = kinships(model, arm)
+    kin = kinships(model, motion.moved)
     plane = mujoco.mjtGeom.mjGEOM_PLANE
     found = {
         (min(pair), max(pair)): []
@@ -108,7 +119,7 @@ def near_distances(
         and plane not in model.geom_type[list(pair)]
     }
     model = _bare(model)
-    data, rows = mujoco.MjData(model), _poses(model, POSES // 4)
+    data, rows = mujoco.MjData(model), _poses(model, motion, POSES // 4)
     misses, allowed = Counter(), (1 - NEARLY) * len(rows)
     for qpos in rows if found else ():
         touching = _touching(model, data, qpos)
@@ -126,20 +137,20 @@ def near_distances(
 
 
 def kinships(
-    model: mujoco.MjModel, arm: Sequence[int]
+    model: mujoco.MjModel, moved: Collection[int]
 ) -> Callable[[int, int], Kinship]:
     """A function of two geoms.
 
     Args:
         model: The model.
-        arm: Ids of its joints.
+        moved: Bodies that the arm moves first.
     """
     weld = model.body_weldid
     can = (model.geom_contype != 0) | (model.geom_conaffinity != 0)
     can[model.pair_geom1] = can[model.pair_geom2] = True
     bodies = set(model.geom_bodyid[can].tolist())
     solid = {0, *weld[list(bodies)].tolist()}
-    heads = set(weld[model.jnt_bodyid[list(arm)]].tolist())
+    heads = set(weld[list(moved)].tolist())
 
     @cache
     def above(body: int) -> list[int]:
@@ -197,38 +208,28 @@ def _touching(
     data.qpos[:] = qpos
     mujoco.mj_kinematics(model, data)
     mujoco.mj_collision(model, data)
-    close = data.contact.geom[data.contact.dist < TOUCH]
+    geoms = data.contact.geom
+    close = geoms[(data.contact.dist < TOUCH) & (geoms >= 0).all(-1)]  # -1: a flex
     return {(i, j) for i, j in np.sort(close, -1).tolist()}
 
 
-def _poses(model: mujoco.MjModel, count: int) -> np.ndarray:
+def _poses(model: mujoco.MjModel, motion: Motion, count: int) -> np.ndarray:
     """`[n, nq]`: random hinges and slides, the reference and key frames if within limits."""
-    simple = np.flatnonzero(np.isin(model.jnt_type, SIMPLE_JOINTS))
-    limited = model.jnt_limited[simple] != 0
+    ids = list(motion.variables)
+    limited = model.jnt_limited[ids] != 0
     low, high = (
-        np.where(limited, model.jnt_range[simple, side], (-np.pi, np.pi)[side])
+        np.where(limited, model.jnt_range[ids, side], (-np.pi, np.pi)[side])
         for side in (0, 1)
     )
-    where = model.jnt_qposadr[simple]
+    where = model.jnt_qposadr[ids]
     rows = np.tile(model.qpos0, (count, 1))
-    rows[:, where] = np.random.default_rng(0).uniform(low, high, (count, len(low)))
+    rows[:, where] = np.random.default_rng(0).uniform(low, high, (count, len(ids)))
     named = np.concatenate([model.qpos0[None], model.key_qpos])
     inside = (named[:, where] >= low) & (named[:, where] <= high)
     rows = np.concatenate([rows, named[inside.all(-1)]])
-    for e in np.flatnonzero(model.eq_type == mujoco.mjtEq.mjEQ_JOINT):
-        if model.eq_active0[e]:
-            joints = model.eq_obj1id[e], model.eq_obj2id[e]
-            rows[:, model.jnt_qposadr[joints[0]]] = _follow(model, rows, *joints, e)
+    free = len(ids) - len(motion.dependent)
+    moved = (rows - model.qpos0)[:, where].T
+    rows[:, where] = model.qpos0[where] + np.stack(
+        follow(motion.dependent, moved[:free]), -1
+    )
     return rows
-
-
-def _follow(
-    model: mujoco.MjModel, rows: np.ndarray, slave: int, master: int, e: int | np.intp
-) -> np.ndarray:
-    """`[n]` positions of a joint that an equality ties to another, or to a constant."""
-    x = np.zeros(len(rows))
-    if master >= 0:
-        address = model.jnt_qposadr[master]
-        x = rows[:, address] - model.qpos0[address]
-    own = model.qpos0[model.jnt_qposadr[slave]]
-    return own + np.polynomial.polynomial.polyval(x, model.eq_data[e, :5])
