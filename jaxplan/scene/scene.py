@@ -59,8 +59,9 @@ class Scene:
                 that are not the gripper's, on the longest way down from the world. It
                 ends where the tree branches into parts with no more joints than stand
                 above (fingers), and before joints at the very end that are called
-                gripper, finger or jaw. Joints that follow others by an <equality><joint>
-                are none of the arm's, unless those can follow them.
+                gripper, finger or jaw; it begins after those that drive a base over the
+                floor. Joints that follow others by an <equality><joint> are none of the
+                arm's, unless those can follow them.
             hand: The body that carries what is held. None: the last body before another
                 joint or a branch follows, from that of the last of `joints` on.
             slots: Room for obstacles that change between queries: how many of each kind
