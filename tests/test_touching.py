@@ -1,10 +1,13 @@
 """What is left out by default, what never is, and what a margin does not count."""
 
+from collections import Counter
+
 import mujoco
 import numpy as np
 import pytest
 
 from jaxplan.collision import clearance_mujoco, make_world
+from jaxplan.collision.oracle import contacts_of
 from jaxplan.scene import Scene
 from jaxplan.scene.contacts import find_contacts, geom_pairs
 
@@ -65,6 +68,46 @@ def test_neighbours_that_nearly_always_touch_are_left_out():
     assert 70 < float(why.split()[2]) < 100
     # l1 has two bodies between, the base three: such contacts are the question's.
     assert {frozenset({"flange", other}) for other in ("l1", "base")} <= pairs(scene)
+
+
+def test_shares_are_those_of_other_random_poses():
+    """Robots at random, whose shapes overlap much."""
+    rng = np.random.default_rng(0)
+    seen = Counter()
+    for _ in range(20):
+        shapes = [
+            f'<geom name="g{i}" type="capsule" size="{rng.uniform(0.03, 0.12)}" '
+            f'fromto="0 0 0 {rng.uniform(-0.1, 0.1)} 0 {rng.uniform(0, 0.3)}"/>'
+            for i in range(5)
+        ]
+        text = shapes[-1]
+        for i in (3, 2, 1):
+            text = (
+                f'<body pos="0 0 .1"><joint name="j{i}" axis="0 {i % 2} {1 - i % 2}" '
+                f'range="-2 2"/>{shapes[i]}{text if i < 3 else ""}</body>'
+            )
+        text = f'<body name="base">{shapes[0]}{text}</body>{shapes[-1]}'
+        scene = Scene.from_mjcf(
+            f'<mujoco><compiler angle="radian"/><worldbody>{text}</worldbody></mujoco>'
+        )
+        whole = Scene.from_mjcf(scene.mj_model, exclude=None)
+        q, touches = rng.uniform(-2, 2, (300, 3)), Counter()
+        for _, geoms in contacts_of(whole, make_world(whole), q):
+            touches.update(
+                frozenset(map(whole.geom_name, pair)) for pair in geoms.tolist()
+            )
+        for _, a, b in whole.pairs:
+            share, out = touches[frozenset({a, b})] / 300, {a, b} in left_out(scene)
+            chain = {"g0", "g1", "g2", "g3"} >= {a, b}
+            near = abs(int(a[1]) - int(b[1])) <= 2
+            if share < 0.6 or (not chain and share < 0.97):
+                assert not out
+            if chain and (
+                (share > 0.8 and near) or (share == 1 and "g0" not in {a, b})
+            ):
+                assert out
+            seen[out] += 1
+    assert min(seen.values()) >= 10
 
 
 TABLE = '<geom name="table" type="box" size=".6 .6 {}" pos="0 0 {}"/>'

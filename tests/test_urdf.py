@@ -199,6 +199,14 @@ def test_what_is_wrong_in_a_urdf_is_said_in_a_line(
     assert "\n" not in str(error.value)
 
 
+def test_a_urdf_is_one_of_the_files_that_a_scene_is_read_from(urdf: Path):
+    scene, same = Scene.from_mjcf(str(urdf)), Scene.from_urdf(urdf)
+    assert (scene.joints, scene.pairs) == (same.joints, same.pairs)
+    urdf.write_text(ROBOT.replace(".02", "-.02"))
+    with pytest.raises(ValueError, match=r"arm\.urdf: .*size"):
+        Scene.from_mjcf(urdf)
+
+
 def test_files_that_are_not_there_are_named(urdf: Path):
     with pytest.raises(FileNotFoundError, match=r"no such file: .*none\.urdf"):
         Scene.from_urdf(urdf.with_name("none.urdf"))

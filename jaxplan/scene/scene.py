@@ -54,7 +54,7 @@ class Scene:
         """Reads a scene.
 
         Args:
-            source: An MJCF's path or text, an `MjSpec` or an `MjModel`.
+            source: An MJCF's path or text, a URDF's path, an `MjSpec` or an `MjModel`.
             joints: The arm's joints in the order of q. None: all hinge and slide joints
                 that are not the gripper's, on the longest way down from the world. It
                 ends where the tree branches into parts with no more joints than stand
