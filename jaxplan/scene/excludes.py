@@ -54,8 +54,8 @@ def find_excludes(
     """
     entries = [exclude] if isinstance(exclude, str) else list(exclude or ())
     rows, geoms = [], set()
-    for entry in dict.fromkeys(e for e in entries if e != ALWAYS):
-        names = _two_bodies(entry, bodies)
+    given = dict.fromkeys(_two_bodies(e, bodies) for e in entries if e != ALWAYS)
+    for names in given:
         rows.append(Excluded(*names, "given"))
         a, b = (bodies.index(name) for name in names)
         geoms |= {tuple(sorted(pair)) for pair in product(*_geoms(model, a, b))}

@@ -174,9 +174,12 @@ def kinships(
         ways = above(a), above(b)
         meet = next(x for x in ways[0] if x in ways[1])
         steps = [way.index(meet) for way in ways]
-        one = meet != 0 or 0 in steps or 0 != carrier(a) == carrier(b)
-        neighbours = sum(steps) <= NEIGHBOURS and one
-        base = all(x and x == carrier(y) for x, y in ((a, b), (b, a)) if not weld[x])
+        apart = meet == 0 not in steps  # with what stands still between them
+        neighbours = sum(steps) <= NEIGHBOURS
+        neighbours &= not apart or 0 != carrier(a) == carrier(b)
+        base = not apart and all(
+            x and x == carrier(y) for x, y in ((a, b), (b, a)) if not weld[x]
+        )
         return Kinship(
             moved=joints(a) != joints(b),
             both=bool(joints(a) and joints(b)),
