@@ -8,6 +8,7 @@ import mujoco
 import numpy as np
 
 from jaxplan.scene.names import known, names_of
+from jaxplan.scene.urdf import read_urdf
 
 SLOTS = "obstacles"
 """The body whose geoms are slots."""
@@ -20,7 +21,7 @@ def compile_model(
     """The compiled model, with geoms of a body `obstacles` as slots.
 
     Args:
-        source: An MJCF's path or text, an `MjSpec` or an `MjModel`.
+        source: An MJCF's path or text, a URDF's path, an `MjSpec` or an `MjModel`.
         slots: How many of each kind, such as `{"box": 16}`.
 
     Raises:
@@ -38,6 +39,9 @@ def compile_model(
             spec = source.copy()
         elif str(source).lstrip().startswith("<"):
             spec = mujoco.MjSpec.from_string(str(source))
+        elif Path(source).suffix == ".urdf":
+            spec = read_urdf(source)
+            where = f"{source}: "
         elif Path(source).is_file():
             where = f"{source}: "
             spec = mujoco.MjSpec.from_file(str(source))
