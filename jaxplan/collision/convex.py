@@ -85,7 +85,7 @@ def least_convex(
         simple = set(kinds[[*a[rows], *b[rows]]]) <= {"sphere", "capsule", "box"}
         tiles = partial(_in_tiles, cores, a[rows], b[rows], (one, other))
         thick = radius[rows]
-        close = tiles(_box_gap, near[rows], jnp.inf) - thick <= reach
+        close = near[rows] & (tiles(_box_gap, near[rows], jnp.inf) - thick <= reach)
         found = tiles(partial(_squared, score), close, jnp.inf)
         scores = score.of_squared(found, thick)
         if score.exact:
