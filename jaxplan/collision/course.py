@@ -43,13 +43,13 @@ class Course:
     """
 
     def __init__(self, scene: Scene, world: World, path: np.ndarray) -> None:
-        turns = np.asarray(getattr(scene, "circular", np.zeros(path.shape[1], bool)))
+        turns = scene.circular
         path = path.copy()
         path[:, turns] = np.unwrap(path[:, turns], axis=0)
         self.scene, self.world, self._path = scene, world, path
         self.replica = Replica(scene)
         self.replica.load(world, path[:1])
-        self.travel = Travel(scene, self.replica, np.asarray(world.held))
+        self.travel = Travel(scene, self.replica, np.asarray(world.held), path)
         self.pieces = self._pieces()
 
     def rows(self, places: np.ndarray) -> np.ndarray:

@@ -13,7 +13,7 @@ import mujoco
 import numpy as np
 
 from jaxplan.collision.oracle import Replica
-from jaxplan.scene import Scene
+from jaxplan.scene import Scene, dependent
 from jaxplan.scene.contacts import KINDS
 
 
@@ -24,11 +24,14 @@ class Travel:
         scene: The scene.
         replica: Its C model, with that world loaded in row 0.
         held: `[n_objects]` bool.
+        path: `[n, d]` joints; bounds are for what lies between these.
     """
 
-    def __init__(self, scene: Scene, replica: Replica, held: np.ndarray) -> None:
+    def __init__(
+        self, scene: Scene, replica: Replica, held: np.ndarray, path: np.ndarray
+    ) -> None:
         self._replica, model = replica, replica.model
-        self._joints, self._rates = _moved_joints(scene)
+        self._joints, self._rates = _moved_joints(scene, path)
         self._slides = model.jnt_type[self._joints] == mujoco.mjtJoint.mjJNT_SLIDE
         carried = _carried(scene, held, self._joints)[model.geom_bodyid]
         counts = replica.counts[0][scene.group_table()]
@@ -78,11 +81,20 @@ class Travel:
         return float(sides[self._pairs].sum(0).max(initial=0.0))
 
 
-def _moved_joints(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
-    """Ids of the joints that q moves, from the world down, and their rates `[n, d]`."""
-    ids = np.array([scene.joint_id(name) for name in scene.joints])
-    rates = np.eye(len(ids))
+def _moved_joints(scene: Scene, path: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Ids of the joints that move on a path, from the world down, and their rates `[n, d]`.
+
+    A rate is how far a joint moves at most while one of the arm's moves by 1.
+    """
+    structure, d = scene.structure, path.shape[1]
+    ids = np.array(structure.variables)
+    reference = np.asarray(scene.model.qpos0, float)[scene.addresses(scene.joints)]
+    ends = (path.min(0) - reference, path.max(0) - reference)
+    still = [(0.0, 0.0)] * len(scene.passive)
+    where = [*zip(*map(np.ndarray.tolist, ends), strict=True), *still]
+    rates = dependent.rates(structure.dependent, where, d)
     order = np.argsort(ids)
+    order = order[rates[order].any(-1)]
     return ids[order], rates[order]
 
 

@@ -1,5 +1,7 @@
 """The arm in a kinematic tree: which joints are its own, and where its hand is."""
 
+from collections.abc import Collection
+
 import mujoco
 import numpy as np
 
@@ -35,9 +37,19 @@ def arm_joints(model: mujoco.MjModel, names: tuple[str, ...]) -> tuple[str, ...]
     return tuple(names[j] for j in arm)
 
 
-def last_body(model: mujoco.MjModel, body: int) -> int:
-    """The last body below `body` before another joint or a branch; itself if all is rigid."""
-    lines = [set(line(model, model.body_parentid[h])) for h in _heads(model, body)]
+def last_body(model: mujoco.MjModel, body: int, following: Collection[int]) -> int:
+    """The last body below `body` before another joint or a branch; itself if all is rigid.
+
+    Args:
+        model: The model.
+        body: Where the arm's last joint is.
+        following: Ids of the joints that follow the arm's: they belong to the arm.
+    """
+    heads = _heads(model, body)
+    while len(heads) == 1 and set(simple_joints(model, heads[0])) <= set(following):
+        body = heads[0]
+        heads = _heads(model, body)
+    lines = [set(line(model, model.body_parentid[head])) for head in heads]
     # Ids grow down the tree: the greatest common one is the last before a branch.
     return max(set.intersection(*lines)) if lines else body
 
