@@ -83,7 +83,7 @@ def settled(model: mujoco.MjModel, qpos: np.ndarray) -> np.ndarray:
 def scene_of(seed: int) -> Scene:
     model = mujoco.MjModel.from_xml_string(random_model(seed))
     tied = set(model.eq_obj1id[model.eq_active0 != 0].tolist())
-    free = [f"j{i}" for i in range(model.njnt) if i not in tied]
+    free = [model.joint(i).name for i in range(model.njnt) if i not in tied]
     return Scene.from_mjcf(model, joints=free[: max(1, len(free) - 1)])
 
 
@@ -99,7 +99,7 @@ def test_bodies_are_where_mujoco_has_them(seed: int):
     scene = scene_of(seed)
     model = scene.mj_model
     active = model.eq_obj1id[model.eq_active0 != 0]
-    assert sorted(scene.dependent) == sorted(f"j{j}" for j in active)
+    assert sorted(scene.dependent) == sorted(model.joint(j).name for j in active)
     world, q = random_rows(scene, seed, 5)
     last = World(*(np.moveaxis(leaf, 0, -1) for leaf in _rows(world, 5)))
     poses = np.asarray(link_poses(scene, last, q.T))

@@ -594,3 +594,17 @@ def slotted() -> Scene:
 def test_unknown_obstacles_are_refused(slotted: Scene, obstacle, line: str):
     with pytest.raises(ValueError, match=line):
         make_world(slotted, obstacles=[obstacle])
+
+
+@pytest.mark.parametrize(
+    ("field", "given", "line"),
+    [
+        ("passive", [0.1], r"\[..., 2\] for finger_joint1, finger_joint2"),
+        ("passive", 0.1, r"passive has shape \(\)"),
+        ("held", [True, False], r"held has shape \(2,\), expected \[..., 1\] for mug"),
+        ("object_pose", [0, 0, 1, 1, 0, 0, 0], r"expected \[..., 1, 7\] for mug"),
+    ],
+)
+def test_worlds_of_the_wrong_shape_are_refused(scene: Scene, field, given, line):
+    with pytest.raises(ValueError, match=line):
+        make_world(scene, **{field: given})

@@ -61,24 +61,27 @@ def make_world(
 
     Raises:
         ValueError: There is no slot of that kind left, or no such pair; an obstacle makes
-            no sense; what is held is a mocap body, or the arm hangs on it.
+            no sense; an array has the wrong shape; what is held is a mocap body, or the
+            arm hangs on it.
     """
     if object_pose is None:
         poses = [_reference_pose(scene, name) for name in scene.objects]
         object_pose = np.array(poses).reshape(-1, 7)
     if held is None:
         held = np.zeros(len(scene.objects), bool)
-    if not isinstance(held, Tracer):
-        _refuse_held(scene, np.asarray(held))
     if passive is None:
         passive = scene.mj_model.qpos0[scene.addresses(scene.passive)]
-    return World(
+    world = World(
         jnp.asarray(object_pose, jnp.float32),
         jnp.asarray(held, bool),
         jnp.asarray(passive, jnp.float32),
         jnp.asarray(scene.ignored(ignored)),
         *fill(scene, obstacles),
     )
+    _refuse_shapes(scene, world)
+    if not isinstance(world.held, Tracer):
+        _refuse_held(scene, np.asarray(world.held))
+    return world
 
 
 def world_at(
@@ -126,9 +129,26 @@ def world_at_key(scene: Scene, key: str | int) -> World:
     return world_at(scene, model.key_qpos[key], np.concatenate(poses, -1))
 
 
+def _refuse_shapes(scene: Scene, world: World) -> None:
+    """Names an array that does not fit the scene, and what its rows are for."""
+    expected = (
+        ("object_pose", world.object_pose, scene.objects, (7,)),
+        ("held", world.held, scene.objects, ()),
+        ("passive", world.passive, scene.passive, ()),
+    )
+    for field, leaf, names, row in expected:
+        own = (len(names), *row)
+        if leaf.shape[-len(own) :] != own:
+            wanted = ", ".join(map(str, ("...", *own)))
+            raise ValueError(
+                f"{field} has shape {leaf.shape}, expected [{wanted}] for "
+                f"{', '.join(names) or 'nothing'}"
+            )
+
+
 def _refuse_held(scene: Scene, held: np.ndarray) -> None:
     """Names what cannot be in the hand."""
-    for name, taken in zip(scene.objects, np.moveaxis(held, -1, 0), strict=False):
+    for name, taken in zip(scene.objects, np.moveaxis(held, -1, 0), strict=True):
         if not taken.any():
             continue
         if name in scene.mocap:

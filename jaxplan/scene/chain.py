@@ -1,13 +1,52 @@
 """The arm in a kinematic tree: which joints are its own, and where its hand is."""
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 
 import mujoco
 import numpy as np
 
+from jaxplan.scene.dependent import Drive, read_drives, turn_to
+from jaxplan.scene.names import known
+
 SIMPLE_JOINTS = int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE)
 GRIPPER = "gripper", "finger", "jaw"
 """Words in the name of a joint that opens a hand."""
+
+
+def read_arm(
+    model: mujoco.MjModel, names: tuple[str, ...], joints: Sequence[str] | None
+) -> tuple[list[int], dict[int, Drive]]:
+    """Ids of the arm's joints, and what drives those that are dependent.
+
+    A joint that follows another is the arm's only if that can follow it instead. If
+    `joints` is None it is left out otherwise, else refused.
+
+    Args:
+        model: The model.
+        names: Of joints, by id.
+        joints: The arm's.
+
+    Raises:
+        ValueError: One of them is not in the model, or cannot be planned for.
+    """
+    given = arm_joints(model, names) if joints is None else joints
+    arm = [names.index(known(name, "joint", names)) for name in given]
+    for name, joint in zip(given, arm, strict=True):
+        if model.jnt_type[joint] not in SIMPLE_JOINTS:
+            raise ValueError(f"joint {name!r} is neither a hinge nor a slide")
+        if arm.count(joint) > 1:
+            raise ValueError(f"joint {name!r} is given twice")
+    drives = read_drives(model, names)
+    for joint in [*arm]:
+        try:
+            drives = turn_to(drives, joint, arm, names)
+        except ValueError:
+            if joints is not None:
+                raise
+            arm.remove(joint)
+    if not arm:
+        raise ValueError("the model has no hinge or slide joint to plan for")
+    return arm, drives
 
 
 def arm_joints(model: mujoco.MjModel, names: tuple[str, ...]) -> tuple[str, ...]:

@@ -32,8 +32,9 @@ def read_numbers(model: mujoco.MjModel) -> Numbers:
             MuJoCo flattens such a geom to a point, and such a body does not turn with its
             parent.
     """
+    bodies = names_of(model, "body")
     for body in np.flatnonzero(model.body_parentid):
-        _refuse_zero(model.body_quat[body], "body", names_of(model, "body")[body])
+        _refuse_zero(model.body_quat[body], "body", bodies[body])
     for geom, quat in enumerate(model.geom_quat):
         _refuse_zero(quat, "geom", model.geom(geom).name or f"geom{geom}")
     qpos0 = model.qpos0.copy()

@@ -255,12 +255,7 @@ class Scene:
         return model.geom(geom).name or f"{self.structure.body_names[body]}[{number}]"
 
     def __repr__(self) -> str:
-        pairs = sum(
-            len(contact.a.ids) * len(contact.b.ids)
-            for group in self.groups
-            for contact in group.contacts
-        )
         return (
             f"Scene(joints: {shortened(self.joints)}; objects: {shortened(self.objects)}; "
-            f"{pairs} pairs; {len(self.slots)} slots)"
+            f"{len(self.pairs)} pairs; {len(self.slots)} slots)"
         )

@@ -7,16 +7,9 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from jaxplan.scene.chain import SIMPLE_JOINTS, arm_joints, last_body, line
+from jaxplan.scene.chain import SIMPLE_JOINTS, last_body, line, read_arm
 from jaxplan.scene.contacts import Contact, find_contacts, kind_of
-from jaxplan.scene.dependent import (
-    Dependent,
-    Drive,
-    in_order,
-    read_drives,
-    root_of,
-    turn_to,
-)
+from jaxplan.scene.dependent import Dependent, in_order, root_of
 from jaxplan.scene.flexes import refuse_flexes
 from jaxplan.scene.loops import refuse_loops
 from jaxplan.scene.names import known, names_of
@@ -108,7 +101,7 @@ def read_structure(
         ValueError: A joint or body is not in the model, or cannot be planned for.
     """
     bodies, every = names_of(model, "body"), names_of(model, "joint")
-    arm, drives = _arm(model, every, joints)
+    arm, drives = read_arm(model, every, joints)
     passive = [
         j
         for j, kind in enumerate(model.jnt_type)
@@ -155,42 +148,6 @@ def read_structure(
         links=links,
         link_of=link_of,
     )
-
-
-def _arm(
-    model: mujoco.MjModel, names: tuple[str, ...], joints: Sequence[str] | None
-) -> tuple[list[int], dict[int, Drive]]:
-    """Ids of the arm's joints, and what drives those that are dependent.
-
-    A joint that follows another is the arm's only if that can follow it instead. If
-    `joints` is None it is left out otherwise, else refused.
-
-    Args:
-        model: The model.
-        names: Of joints, by id.
-        joints: The arm's.
-
-    Raises:
-        ValueError: One of them is not in the model, or cannot be planned for.
-    """
-    given = arm_joints(model, names) if joints is None else joints
-    arm = [names.index(known(name, "joint", names)) for name in given]
-    for name, joint in zip(given, arm, strict=True):
-        if model.jnt_type[joint] not in SIMPLE_JOINTS:
-            raise ValueError(f"joint {name!r} is neither a hinge nor a slide")
-        if arm.count(joint) > 1:
-            raise ValueError(f"joint {name!r} is given twice")
-    drives = read_drives(model, names)
-    for joint in [*arm]:
-        try:
-            drives = turn_to(drives, joint, arm, names)
-        except ValueError:
-            if joints is not None:
-                raise
-            arm.remove(joint)
-    if not arm:
-        raise ValueError("the model has no hinge or slide joint to plan for")
-    return arm, drives
 
 
 def _groups(
