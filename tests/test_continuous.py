@@ -27,10 +27,13 @@ ARM = """<mujoco><compiler angle="radian"/><worldbody>
         <joint name="twist" axis="0 0 1" range="-3 3"/>
         <geom name="fore" type="cylinder" size=".015 .08" pos="0 0 .1"/>
         <geom name="tip" type="sphere" size=".02" pos="0 0 .2"/>
+        <body name="claw" pos=".05 0 .1"><joint name="claw" type="slide"/>
+          <geom name="claw" type="sphere" size=".01"/></body>
   </body></body></body>
   <body name="cup" pos="0 0 9"><freejoint/><geom name="cup" type="cylinder" size=".03 .04"/>
   </body>
-</worldbody></mujoco>"""
+</worldbody><equality><joint joint1="claw" joint2="elbow" polycoef=".01 .05 .03 0 0"/>
+</equality></mujoco>"""
 
 
 ROCKS = "ball", "brick", "log", "egg"
@@ -96,7 +99,8 @@ def test_no_two_geoms_move_farther_than_their_bound(arm: Scene):
         middle = rng.uniform(-1, 1, 4)
         half = 10 ** rng.uniform(-3, 0, 4) * (rng.random(4) < 0.7)
         before = distances(replica, middle, world)
-        travel = Travel(scene, replica, np.asarray(world.held), middle[None])
+        ends = np.stack([middle - half, middle + half])
+        travel = Travel(scene, replica, np.asarray(world.held), ends)
         sides = travel.sides(half)
         table = scene.group_table()
         i, j = np.nonzero((table >= 0) & replica.counts[0][table])
@@ -176,3 +180,59 @@ def test_what_is_proven_holds_at_a_tenth_of_a_millimetre(arm: Scene, rock: str):
             if fine.clearance >= 0.002:
                 assert proof.valid, proof.reason
     assert {(True, True), (False, False)} <= set(seen)
+
+
+LID = """<mujoco><compiler angle="radian"/><worldbody>
+  <geom name="pot" type="{}" size=".1 .1 .1"/>
+  <body pos="0 0 {}"><joint name="j" axis="0 0 1" range="-2 2"/>
+    <geom name="lid" type="box" size=".1 .1 .05"/></body>
+</worldbody></mujoco>"""
+
+
+@pytest.mark.parametrize("kind", ["box", "cylinder"])
+def test_what_is_always_near_is_proven_all_the_same(kind: str):
+    """A lid 0.2 mm over a pot: its corners move by 300 mm."""
+    for gap, tolerance in ((2e-4, 0.0), (-5e-4, 0.001)):
+        scene = Scene.from_mjcf(LID.format(kind, 0.15 + gap))
+        path = [[-1.0], [1.0]]
+        certificate = certify(
+            scene, make_world(scene), path, tolerance=tolerance, continuous=True
+        )
+        assert certificate.proven
+        assert set(certificate.pair) == {"lid", "pot"}
+        assert -tolerance <= certificate.clearance <= gap + 1e-6
+
+
+def test_what_cannot_be_proven_is_named():
+    """The lid lies on the pot: no contact that is deeper than 0, and none that is not."""
+    scene = Scene.from_mjcf(LID.format("box", 0.15 + 1e-5))
+    world, path = make_world(scene), [[-1.0], [1.0]]
+    assert certify(scene, world, path, tolerance=0.0).valid
+    certificate = certify(scene, world, path, tolerance=0.0, continuous=True)
+    assert not certificate.valid
+    assert certificate.proven is False
+    assert set(certificate.pair) == {"lid", "pot"}
+    assert certificate.reason.startswith("not proven: ")
+    assert "0.01 mm apart" in certificate.reason
+    np.testing.assert_allclose(certificate.clearance, 1e-5, atol=2e-6)
+
+
+def test_a_wall_between_coarse_samples_is_a_collision():
+    scene = Scene.from_mjcf("""<mujoco><worldbody>
+      <geom name="wall" type="box" size=".0005 .2 .2" pos=".5 0 0"/>
+      <body><joint name="x" type="slide" axis="1 0 0"/><geom name="tip" size=".003"/></body>
+    </worldbody></mujoco>""")
+    path = [[0.0], [0.9]]
+    assert certify(scene, make_world(scene), path, resolution=1.0).valid
+    certificate = certify(scene, make_world(scene), path, 1.0, continuous=True)
+    assert not certificate.valid
+    assert set(certificate.pair) == {"tip", "wall"}
+    np.testing.assert_allclose(certificate.where, 0.5 / 0.9, atol=0.01)
+    assert " mm deep at 0.5" in certificate.reason
+
+
+def test_without_pairs_everything_is_proven():
+    scene = Scene.from_mjcf(LID.replace("<geom", '<geom contype="0"').format("box", 0))
+    certificate = certify(scene, make_world(scene), [[-1.0], [1.0]], continuous=True)
+    assert certificate.proven
+    assert certificate.pair is None

@@ -30,12 +30,12 @@ class Proof(NamedTuple):
     """A place where it failed; NaN if it did not."""
 
 
-def prove(course: Course, least: float) -> Proof:
-    """Proves that no pair is nearer than `least` [m]."""
+def prove(course: Course, least: float, most: float) -> Proof:
+    """Proves that no pair is nearer than `least`, and how far they are, up to `most` [m]."""
     parts, ours, stuck = _halve(course.pieces, lambda s: _our_gaps(course, s), least)
     if not math.isnan(stuck):
         return Proof(-math.inf, stuck)
-    known = ours.min(initial=math.inf)
+    known = float(ours.min(initial=most))
     _, theirs, stuck = _halve(parts, lambda s: _their_gaps(course, s, known), least)
     if not math.isnan(stuck):
         return Proof(-math.inf, stuck)
@@ -73,15 +73,7 @@ def _halve(
 
 def _our_gaps(course: Course, parts: Stretches) -> np.ndarray:
     middle, half = course.middles(parts)
-    replica, travel = course.replica, course.travel
-    replica.load(course.world, middle)
-    most = []
-    for row in range(len(middle)):
-        replica.pose(row)
-        most.append(travel.most(travel.sides(half[row])))
-    return (
-        clearance_rows(course.scene, course.world, middle) - np.array(most) - ROUNDING
-    )
+    return clearance_rows(course.scene, course.world, middle, half) - ROUNDING
 
 
 def _their_gaps(course: Course, parts: Stretches, most: float) -> np.ndarray:

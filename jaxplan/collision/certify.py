@@ -16,7 +16,9 @@ from jaxplan.collision.world import World
 from jaxplan.scene import Scene
 
 SIGHT = 0.1
-"""The nearest pair is named if it is no farther apart than this [m]."""
+"""The nearest pair is named if it is no farther apart than this [m]; no more is proven."""
+FINEST = 1e-4
+"""A proven clearance may be this much too low [m]."""
 
 
 class Certificate(NamedTuple):
@@ -27,7 +29,7 @@ class Certificate(NamedTuple):
     anywhere (`proven`)."""
     clearance: float
     """Least signed distance [m], negative = penetration: where it was checked, or, if
-    `proven`, a lower bound of it for all of the path. NaN if there is none to be had."""
+    `proven`, a lower bound of it, at most 0.1, on all of the path. NaN: not measured."""
     pair: tuple[str, str] | None
     """The geoms (or bodies) that are nearest to each other, by name; None beyond 0.1 m."""
     where: float
@@ -86,12 +88,15 @@ def certify(
         return sampled
     if not sampled.valid:
         return sampled._replace(proven=False)
-    proof = prove(course, max(-tolerance, sampled.clearance - resolution))
+    most = min(sampled.clearance, SIGHT)
+    proof = prove(course, max(-tolerance, most - max(resolution, FINEST)), most)
     if math.isnan(proof.stuck):
         return sampled._replace(clearance=proof.clearance, proven=True)
     q = course.rows(np.array([proof.stuck]))[0]
     pair, distance = worst_pair(scene, world, q, SIGHT)
-    reason = f"not proven: {_said(pair, distance)} at {proof.stuck:.3f}"
+    reason = f"{_said(pair, distance)} at {proof.stuck:.3f}"
+    if distance >= -tolerance:
+        reason = f"not proven: {reason}"
     return Certificate(False, distance, pair, proof.stuck, q, reason, False)
 
 
