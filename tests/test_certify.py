@@ -347,7 +347,6 @@ def test_what_always_touches_is_found():
     assert scene.joints == ("a", "b")
     found = dict(always_touching(scene))
     # A link on a base that does not move is no child of it to MuJoCo's filter.
-    # What no joint of the arm moves against each other (left, right) counts for nothing.
     assert found == {"a|base": 1.0, "b|base": 1.0}
 
 

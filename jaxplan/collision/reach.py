@@ -199,10 +199,8 @@ def core_radius(kind: str, shapes: Shapes) -> jax.Array:
 
 
 def rest(scene: Scene, world: World) -> jax.Array:
-    """`[d, B]` the joints amid their limits, or at their reference where they have none."""
-    low, high = scene.q_min, scene.q_max
-    reference = jnp.asarray(scene.model.qpos0)[scene.addresses(scene.joints)]
-    middle = jnp.where(jnp.isfinite(low + high), (low + high) / 2, reference)
+    """`[d, B]` the joints at their reference."""
+    middle = jnp.asarray(scene.model.qpos0)[scene.addresses(scene.joints)]
     width = max(leaf.shape[-1] for leaf in world)
     return jnp.broadcast_to(middle[:, None], (len(middle), width))
 
