@@ -179,21 +179,29 @@ class Planner:
         self,
         plan: Plan | ArrayLike,
         world: World | None = None,
-        resolution: float = 0.01,
+        resolution: float = 0.005,
         tolerance: float = 0.001,
+        continuous: bool = False,
     ) -> Certificate:
-        """What C MuJoCo, which had no part in it, says about a path; see `collision.certify`.
+        """What C MuJoCo and our own distance say about a path; see `collision.certify`.
 
         Args:
-            plan: A plan, or waypoints `[n, d]` [rad].
+            plan: A plan, or waypoints `[n, d]` [rad or m].
             world: The plan's own where None.
-            resolution: Longest gap between checked configurations [rad].
+            resolution: No two geoms move by more than this against each other between two
+                checked configurations [m].
             tolerance: Penetration that still passes [m].
+            continuous: Prove it between checked configurations too.
+
+        Raises:
+            ValueError: An argument makes no sense.
         """
-        path = plan.path if isinstance(plan, Plan) else np.asarray(plan, float)
+        path = plan.path if isinstance(plan, Plan) else plan
         own = plan.world if isinstance(plan, Plan) else self.empty_world
         world = own if world is None else world
-        return collision.certify(self.scene, world, path, resolution, tolerance)
+        return collision.certify(
+            self.scene, world, path, resolution, tolerance, continuous
+        )
 
     def clearance(self, qs: ArrayLike, world: World | None = None) -> np.ndarray:
         """Least signed distance over all pairs that count `[...]` [m], negative = penetration.

@@ -167,7 +167,12 @@ def test_a_plan_is_written_certified_and_filmed(tmp_path, capsys):
     command = ["plan", str(ARM), "--start", "left", "--goal", goal]
     assert main([*command, "--out", str(out), "--video", "--seed", "3"]) == 0
     output = capsys.readouterr().out
-    for words in ("solved", "expansions", "waypoints", "C MuJoCo on the motion: free"):
+    for words in (
+        "solved",
+        "expansions",
+        "waypoints",
+        "certificate of the motion: free",
+    ):
         assert words in output
     record = json.loads((out / "plan.json").read_text())
     assert record["status"] == "solved"

@@ -2,10 +2,10 @@
 
 from jaxplan.collision.certify import Certificate as Certificate
 from jaxplan.collision.certify import certify as certify
+from jaxplan.collision.closest import closest_pair as closest_pair
 from jaxplan.collision.engine import XLA_OPTIONS as XLA_OPTIONS
 from jaxplan.collision.obstacles import Obstacle as Obstacle
 from jaxplan.collision.oracle import clearance_mujoco as clearance_mujoco
-from jaxplan.collision.oracle import closest_pair as closest_pair
 from jaxplan.collision.queries import clearance as clearance
 from jaxplan.collision.queries import config_free as config_free
 from jaxplan.collision.queries import motion_bound as motion_bound

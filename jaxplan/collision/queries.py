@@ -22,7 +22,11 @@ only those about contact itself (margin 0) and the depth of penetration are to b
 
 
 def clearance(
-    scene: Scene, world: World, q: jax.Array, backend: Backend = "fast"
+    scene: Scene,
+    world: World,
+    q: jax.Array,
+    backend: Backend = "fast",
+    motion: jax.Array | None = None,
 ) -> jax.Array:
     """Least signed distance over all pairs that count.
 
@@ -31,12 +35,14 @@ def clearance(
         world: Its leading axes broadcast against those of q.
         q: `[..., d]` joints [rad].
         backend: Who answers.
+        motion: `[..., d]` [rad or m]. If given: a lower bound on it in every configuration
+            whose joints are each within `motion` of q, but for rounding in float32.
 
     Returns:
         `[...]` [m], negative = penetration; NaN where q or the world is not finite, or a
         quaternion is zero.
     """
-    return _flat(scene, world, q, Score(exact=True), backend)
+    return _flat(scene, world, q, Score(exact=True), backend, motion)
 
 
 def config_free(

@@ -76,7 +76,7 @@ def plan(
         certificates = {k: planner.certify(q, world) for k, q in paths.items()}
         print(f"motion: {timed.t[-1]:.2f} s, {len(timed.t)} samples")
         for name, certificate in certificates.items():
-            print(f"C MuJoCo on the {name}: {_verdict(certificate)}")
+            print(f"certificate of the {name}: {_verdict(certificate)}")
     good = answer.solved and all(c.valid for c in certificates.values())
     if out is not None:
         record = _record(path, scene, (first, last), answer, timed, certificates)
@@ -104,13 +104,12 @@ def _show(answer: Plan) -> None:
 
 def _verdict(certificate: Certificate) -> str:
     """A certificate in words."""
-    verdict = "free" if certificate.valid else "refused"
+    if not certificate.valid:
+        return f"refused: {certificate.reason}"
     if certificate.pair is None:
-        return verdict
-    deep = f"{-1000 * certificate.clearance:.2f} mm deep"
-    return (
-        f"{verdict}, {' and '.join(certificate.pair)} {deep} at {certificate.where:.2f}"
-    )
+        return "free"
+    gap = f"{1000 * certificate.clearance:.2f} mm at {certificate.where:.2f}"
+    return f"free, nearest {' and '.join(certificate.pair)}, {gap}"
 
 
 def _record(

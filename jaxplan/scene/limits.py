@@ -49,10 +49,10 @@ def circular(structure: Structure) -> np.ndarray:
     return ((turns == 0) | (whole & ~slides & ~limited)).all(0)
 
 
-def rates(structure: Structure, numbers: Numbers) -> np.ndarray:
+def rates(structure: Structure) -> np.ndarray:
     """`[n, d]`, see `Scene.rates`."""
     d, free = len(structure.joints), len(structure.variables) - len(structure.dependent)
-    allowed = _allowed(structure, numbers)[:free]
+    allowed = _allowed(structure, structure.mj_model)[:free]
     where = [
         _room(structure, i, own) if i < d else (-np.inf, np.inf)
         for i, own in enumerate(allowed)
@@ -60,7 +60,9 @@ def rates(structure: Structure, numbers: Numbers) -> np.ndarray:
     return dependent.rates(structure.dependent, where, d)
 
 
-def _allowed(structure: Structure, numbers: Numbers) -> list[list[Interval]]:
+def _allowed(
+    structure: Structure, numbers: Numbers | mujoco.MjModel
+) -> list[list[Interval]]:
     """Where each of the `variables` may be, from its reference."""
     model, ids = structure.mj_model, np.array(structure.variables)
     reference = np.asarray(numbers.qpos0, float)[model.jnt_qposadr[ids]]

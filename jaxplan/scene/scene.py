@@ -125,14 +125,17 @@ class Scene:
         """The scene with some of its `Numbers` replaced, e.g. `geom_pos`.
 
         No recompilation follows, except from `geom_quat`: which boxes are parallel is
-        structure, so that field must be concrete and gives a new structure.
+        structure, so that field must be concrete and gives a new structure. So it is with
+        `jnt_range` and `qpos0` where joints follow others, for how fast they do.
         """
         structure = self.structure
-        if "geom_quat" in fields:
-            turned = copy.copy(self.mj_model)
-            turned.geom_quat[:] = np.asarray(fields["geom_quat"])
+        follows = ("jnt_range", "qpos0") if structure.dependent else ()
+        if changed := fields.keys() & {"geom_quat", *follows}:
+            model = copy.copy(self.mj_model)
+            for name in changed:
+                getattr(model, name)[:] = np.asarray(fields[name])
             names = self.joints, self.hand, SLOTS if self.slots else None
-            structure = read_structure(turned, *names, structure.excludes)
+            structure = read_structure(model, *names, structure.excludes)
         return Scene(self.model._replace(**fields), structure)
 
     @property
@@ -223,7 +226,7 @@ class Scene:
 
         Of all hinges and slides (`Structure.variables`), within the limits.
         """
-        return rates(self.structure, self.model)
+        return rates(self.structure)
 
     def joint_id(self, name: str) -> int:
         """MuJoCo's id of a joint; joints without a name are called joint4, after theirs."""
