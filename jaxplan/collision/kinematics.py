@@ -9,8 +9,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxplan.collision.world import World
-from jaxplan.scene import Link, Scene
+from jaxplan.collision.world import OWN_AXES, World, batch_last, batch_shape
+from jaxplan.scene import Link, Scene, only_line
 
 
 def link_poses(scene: Scene, world: World, q: jax.Array) -> jax.Array:
@@ -27,7 +27,6 @@ def link_poses(scene: Scene, world: World, q: jax.Array) -> jax.Array:
         world itself.
     """
     links = scene.structure.links
-    hand = scene.structure.link_of[scene.body_id(scene.hand)]
     objects = [row for row, link in enumerate(links, 1) if link.object >= 0]
     first, last = (objects[0], objects[-1]) if objects else (len(links) + 1,) * 2
     fixed = jnp.broadcast_to(jnp.eye(3, 4)[..., None], (3, 4, q.shape[-1]))
@@ -37,9 +36,74 @@ def link_poses(scene: Scene, world: World, q: jax.Array) -> jax.Array:
         index = links[row - 1].object
         given = world.object_pose[index]
         local = jnp.concatenate([rotation_of(given[3:]), given[:3, None]], 1)
+        hand = scene.structure.link_of[scene.body_id(scene.hand)]
         base = jnp.where(world.held[index], poses[hand], fixed)
         poses = poses.at[row].set(_compose(base, local))
     return _attach(scene, world, q, poses, range(last + 1, len(links) + 1))
+
+
+def frame_pose(scene: Scene, world: World, q: jax.Array, body: str) -> jax.Array:
+    """Pose of any body of the model, whether collision needs it or not.
+
+    Args:
+        scene: The scene.
+        world: Its leading axes broadcast against those of q.
+        q: `[..., d]` joints [rad or m].
+        body: Its name.
+
+    Returns:
+        `[..., 3, 4]` rotation and position [m] in the world.
+
+    Raises:
+        ValueError: There is no such body, or it hangs on a ball joint.
+    """
+    shape = batch_shape(world, q)
+    leaves = zip(world, OWN_AXES, strict=True)
+    flat = World(*(batch_last(leaf, shape, own) for leaf, own in leaves))
+    rows = batch_last(jnp.broadcast_to(q, (*shape, q.shape[-1])), shape, 1)
+    line = _line(scene, body)
+    poses = link_poses(line, flat, rows)[line.structure.link_of[scene.body_id(body)]]
+    return jnp.moveaxis(poses, -1, 0).reshape(*shape, 3, 4)
+
+
+def frame_jacobian(
+    scene: Scene, world: World, q: jax.Array, body: str
+) -> tuple[jax.Array, jax.Array]:
+    """A body's pose, and how the arm's joints move it.
+
+    Args:
+        scene: The scene.
+        world: Leaves with the batch last, as for `link_poses`.
+        q: `[d, B]` joints [rad or m].
+        body: Its name; nothing that the hand may hold.
+
+    Returns:
+        `[3, 4, B]` as `frame_pose`; `[6, d, B]` the velocity of the body's origin and its
+        angular velocity, in the world, by that of each joint (as `mj_jacBody`).
+    """
+    line, model = _line(scene, body), scene.model
+    every = list(enumerate(line.structure.links, 1))
+    rows, links = zip(*((i, link) for i, link in every if link.joint >= 0), strict=True)
+    joint = np.array([link.joint for link in links])
+    slides = np.array([link.slides for link in links])[:, None, None]
+    poses = link_poses(line, world, q)
+    pose = poses[line.structure.link_of[scene.body_id(body)]]
+    moved = poses[np.array(rows)]
+    axis, anchor = (
+        sum(moved[:, :, k] * vectors[joint, k, None, None] for k in range(3))
+        for vectors in (model.jnt_axis, model.jnt_pos)
+    )
+    lever = pose[:, 3] - anchor - moved[:, :, 3]
+    linear = jnp.where(slides, axis, jnp.cross(axis, lever, axis=1))
+    motion = jnp.concatenate([linear, jnp.where(slides, 0, axis)], 1)
+
+    def speeds(direction: jax.Array) -> jax.Array:
+        along = jnp.broadcast_to(direction[:, None], q.shape)
+        return jax.jvp(lambda q: _values(line, world, q, links), (q,), (along,))[1]
+
+    speed = jax.vmap(speeds)(jnp.eye(len(q)))
+    jacobian = sum(speed[:, i] * motion[i, :, None] for i in range(len(links)))
+    return pose, jacobian
 
 
 def rotation_of(quat: jax.Array) -> jax.Array:
@@ -117,3 +181,8 @@ def _values(
     values = jnp.concatenate([q, passive])[variable]
     reference = jnp.asarray(scene.model.qpos0)[address]
     return jnp.where(variable[:, None] >= 0, values - reference[:, None], 0)
+
+
+def _line(scene: Scene, body: str) -> Scene:
+    """The scene with the links of one body's line only."""
+    return Scene(scene.model, only_line(scene.structure, scene.body_id(body)))

@@ -140,6 +140,20 @@ def read_structure(
     )
 
 
+def only_line(structure: Structure, body: int) -> Structure:
+    """The structure with no links but those of one body's line, and of the hand's where
+    that may hold what the body hangs on."""
+    model = structure.mj_model
+    bodies, every = structure.body_names, structure.joint_names
+    objects = [bodies.index(name) for name in structure.objects]
+    needed = set(line(model, body))
+    if needed & set(objects):
+        needed |= set(line(model, bodies.index(structure.hand)))
+    variables = [every.index(n) for n in (*structure.joints, *structure.passive)]
+    links, link_of = _links(model, needed, every, variables, objects)
+    return dataclasses.replace(structure, links=links, link_of=link_of)
+
+
 def _groups(
     model: mujoco.MjModel, names: tuple[str, ...], arm: set[int], free: list[int]
 ) -> tuple[Group, ...]:
