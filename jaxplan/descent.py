@@ -5,9 +5,9 @@ the next is damped less, another is not taken and the next is damped more (Leven
 Marquardt).
 """
 
-from collections.abc import Callable
-from functools import partial
-from typing import NamedTuple
+from collections.abc import Callable, Iterable
+from functools import partial, reduce
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -34,14 +34,14 @@ DAMPING, EASE, BRAKE, LEAST = 0.03, 0.2, 4.0, 1e-6
 class Window(NamedTuple):
     """Where joints may be and where they start, `[d]` each [rad or m]."""
 
-    low: jax.typing.ArrayLike
-    high: jax.typing.ArrayLike
-    first: jax.typing.ArrayLike
+    low: Any
+    high: Any
+    first: Any
     """Starts are drawn from here"""
-    last: jax.typing.ArrayLike
+    last: Any
     """to here,"""
-    reference: jax.typing.ArrayLike
-    """around this. Joints that do not move the body stay at it."""
+    reference: Any
+    """around this."""
 
 
 class Misfit(NamedTuple):
@@ -115,8 +115,7 @@ def descend(
     _, _, q, misfit, _, _ = jax.lax.while_loop(
         lambda state: (state[0] <= ITERATIONS) & ~state[-1].all(), go, state
     )
-    moved = (misfit.slope != 0).any((0, 2))[:, None]
-    return jnp.where(moved, q, window.reference).T, within(misfit, 0.5)
+    return q.T, within(misfit, 0.5)
 
 
 def _starts(
@@ -133,7 +132,7 @@ def _starts(
         return (jnp.where(keep, best[0], distance), jnp.where(keep, best[1], q)), None
 
     best = jnp.full(len(spread), jnp.inf), drawn[0]
-    return jax.lax.scan(nearer, best, drawn)[0][1]
+    return jax.lax.scan(nearer, best, jnp.asarray(drawn))[0][1]
 
 
 def _step(
@@ -149,10 +148,10 @@ def _step(
     locked = jnp.zeros(q.shape, bool)
     for _ in range(2):
         slope = jnp.where(locked, 0, slope)
-        square = sum(slope[:, None, j] * slope[None, :, j] for j in range(len(q)))
+        square = _sum(slope[:, None, j] * slope[None, :, j] for j in range(len(q)))
         square = square + damping * jnp.eye(6)[..., None]
         force = _solve(jax.lax.optimization_barrier(square), error)
-        step = -sum(slope[i] * force[i] for i in range(6))
+        step = -_sum(slope[i] * force[i] for i in range(6))
         out = (q + step < window.low) | (q + step > window.high)
         locked |= out
     return jnp.clip(q + step, window.low, window.high)
@@ -196,15 +195,16 @@ def _misfit(
 def _turn(
     turn: jax.Array, wanted: jax.Array, axis: jax.Array
 ) -> tuple[jax.Array, jax.Array, jax.Array]:
-    """The rotation from the wanted orientation to the body's: that of the free axis where
-    there is one, else of the whole body.
+    """The rotation from the wanted orientation to the body's.
+
+    Where it may turn about an axis, the shortest one that turns that axis.
 
     Returns:
         Its axis times its sine `[3, B]` in the world, its cosine `[B]`, and the axis about
         which turning is free `[3, B]`, or zeros.
     """
     now, then = _turned(turn, axis), _turned(wanted, axis)
-    r = sum(turn[:, None, k] * wanted[None, :, k] for k in range(3))
+    r = _sum(turn[:, None, k] * wanted[None, :, k] for k in range(3))
     whole = jnp.stack([r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1]]) / 2
     free = (axis != 0).any(0)
     sine = jnp.where(free, jnp.cross(then, now, axis=0), whole)
@@ -227,7 +227,11 @@ def _dot(a: jax.Array, b: jax.Array) -> jax.Array:
 
 
 def _square(a: jax.Array) -> jax.Array:
-    return sum((row * row for row in a), jnp.zeros(a.shape[1:]))
+    return _sum(row * row for row in a)
+
+
+def _sum(terms: Iterable[jax.Array]) -> jax.Array:
+    return reduce(jnp.add, terms)
 
 
 def _turned(rotation: jax.Array, vector: jax.Array) -> jax.Array:

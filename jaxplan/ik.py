@@ -5,14 +5,13 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import NamedTuple
 
-import jax
 import numpy as np
 from numpy.typing import ArrayLike
 
 from jaxplan.collision import World
 from jaxplan.descent import LANES, Window, descend
 from jaxplan.pose import Pose, Region, regions
-from jaxplan.scene import Scene
+from jaxplan.scene import Scene, movers
 
 ROUNDS = 4
 """Calls of `LANES` starts at most for one pose."""
@@ -79,9 +78,8 @@ def inverse_kinematics(
     limits = limits_of(scene) if limits is None else limits
     reference = _reference(scene, limits, reference)
     body, region = regions(scene, [pose])
-    _refuse_still(scene, body)
     region = Region(*(np.repeat(leaf, LANES, -1) for leaf in region))
-    window = _window(scene, limits, reference)
+    window = _window(scene, limits, reference, _movers(scene, body))
     found: list[tuple[np.ndarray, np.ndarray]] = []
     spread = np.minimum(1, np.linspace(0, 2, LANES, dtype=np.float32))
     for call in range(ROUNDS):
@@ -132,8 +130,8 @@ def inverse_kinematics_batch(
     if not len(poses):
         return best, reached
     body, region = regions(scene, poses)
-    _refuse_still(scene, body)
-    window, spread = _window(scene, limits, reference), np.ones(LANES, np.float32)
+    window = _window(scene, limits, reference, _movers(scene, body))
+    spread = np.ones(LANES, np.float32)
 
     def attempt(call: int, rows: np.ndarray) -> tuple[np.ndarray, ...]:
         part = Region(*(leaf[:, rows] for leaf in region))
@@ -176,18 +174,26 @@ def _reference(scene: Scene, limits: Limits, reference: ArrayLike | None) -> np.
     return given
 
 
-def _refuse_still(scene: Scene, body: str) -> None:
-    if not scene.arm_bodies & set(scene.line(scene.body_id(body))):
+def _movers(scene: Scene, body: str) -> np.ndarray:
+    """`[d]` bool: joints that move the body."""
+    moving = movers(scene.structure, scene.body_id(body))
+    if not moving.any():
         raise ValueError(f"no joint of the arm moves body {body!r}")
+    return moving
 
 
-def _window(scene: Scene, limits: Limits, reference: np.ndarray) -> Window:
-    """Starts are within the limits, and a turn or two metres about the reference where a
-    hinge's are wider or a slide has none."""
+def _window(
+    scene: Scene, limits: Limits, reference: np.ndarray, moving: np.ndarray
+) -> Window:
+    """Where starts are drawn: around the reference, within the limits.
+
+    Of a hinge no more than a turn, of a slide without limits two metres; joints that do
+    not move the body stay.
+    """
     low, high, _ = limits
     hinge = np.array([scene.joint_kind(name) == "hinge" for name in scene.joints])
     width = np.where(hinge, 2 * np.pi, np.where(np.isinf(high - low), 2, np.inf))
-    width = np.minimum(width, high - low)
+    width = np.where(moving, np.minimum(width, high - low), 0)
     near = np.clip(reference, low, high)
     first = np.clip(near - width / 2, low, high - width)
     return Window(low, high, first, first + width, near)
@@ -205,7 +211,7 @@ def _sorted(q: np.ndarray, limits: Limits, reference: np.ndarray) -> np.ndarray:
     q = q[np.argsort(np.linalg.norm(q - reference, axis=1), kind="stable")]
     apart = np.abs(q[:, None] - q)
     turn = np.where(limits.circular, np.minimum(apart, 2 * np.pi - apart), apart)
-    same = (turn <= SAME).all(-1)
+    same = np.asarray(turn <= SAME).all(-1)
     kept: list[int] = []
     for row in range(len(q)):
         if not same[row, kept].any():

@@ -115,7 +115,7 @@ def regions(scene: Scene, poses: Sequence[Pose]) -> tuple[str, Region]:
             place + turn.apply(pose.offset),
             turn.apply(np.eye(3)["xyz".index(pose.free)]) if pose.free else np.zeros(3),
             [
-                *pose.position_tolerance,
+                *np.asarray(pose.position_tolerance),
                 np.inf if pose.quaternion is None else pose.rotation_tolerance,
             ],
         )

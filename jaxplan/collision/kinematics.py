@@ -5,12 +5,16 @@ into whatever uses it and computes the whole arm again for every sphere. The loo
 buffer is a wall that it does not cross.
 """
 
+from functools import reduce
+from itertools import groupby
+
 import jax
 import jax.numpy as jnp
 import numpy as np
 
 from jaxplan.collision.world import OWN_AXES, World, batch_last, batch_shape
 from jaxplan.scene import Link, Scene, only_line
+from jaxplan.scene.dependent import follow
 
 
 def link_poses(scene: Scene, world: World, q: jax.Array) -> jax.Array:
@@ -27,19 +31,21 @@ def link_poses(scene: Scene, world: World, q: jax.Array) -> jax.Array:
         world itself.
     """
     links = scene.structure.links
-    objects = [row for row, link in enumerate(links, 1) if link.object >= 0]
-    first, last = (objects[0], objects[-1]) if objects else (len(links) + 1,) * 2
     fixed = jnp.broadcast_to(jnp.eye(3, 4)[..., None], (3, 4, q.shape[-1]))
     poses = jnp.zeros((1 + len(links), *fixed.shape)).at[0].set(fixed)
-    poses = _attach(scene, world, q, poses, range(1, first))
-    for row in objects:
-        index = links[row - 1].object
-        given = world.object_pose[index]
-        local = jnp.concatenate([rotation_of(given[3:]), given[:3, None]], 1)
-        hand = scene.structure.link_of[scene.body_id(scene.hand)]
-        base = jnp.where(world.held[index], poses[hand], fixed)
-        poses = poses.at[row].set(_compose(base, local))
-    return _attach(scene, world, q, poses, range(last + 1, len(links) + 1))
+    rows = range(1, len(links) + 1)
+    for placed, run in groupby(rows, lambda row: links[row - 1].object >= 0):
+        if not placed:
+            poses = _attach(scene, world, q, poses, [*run])
+            continue
+        for row in run:
+            index = links[row - 1].object
+            given = world.object_pose[index]
+            local = jnp.concatenate([rotation_of(given[3:]), given[:3, None]], 1)
+            hand = scene.structure.link_of[scene.body_id(scene.hand)]
+            base = jnp.where(world.held[index], poses[hand], fixed)
+            poses = poses.at[row].set(_compose(base, local))
+    return poses
 
 
 def frame_pose(scene: Scene, world: World, q: jax.Array, body: str) -> jax.Array:
@@ -82,8 +88,13 @@ def frame_jacobian(
         angular velocity, in the world, by that of each joint (as `mj_jacBody`).
     """
     line, model = _line(scene, body), scene.model
-    every = list(enumerate(line.structure.links, 1))
-    rows, links = zip(*((i, link) for i, link in every if link.joint >= 0), strict=True)
+    above = scene.line(scene.body_id(body))
+    every = [
+        (row, link)
+        for row, link in enumerate(line.structure.links, 1)
+        if link.joint >= 0 and link.body in above
+    ]
+    rows, links = zip(*every, strict=True)
     joint = np.array([link.joint for link in links])
     slides = np.array([link.slides for link in links])[:, None, None]
     poses = link_poses(line, world, q)
@@ -102,8 +113,9 @@ def frame_jacobian(
         return jax.jvp(lambda q: _values(line, world, q, links), (q,), (along,))[1]
 
     speed = jax.vmap(speeds)(jnp.eye(len(q)))
-    jacobian = sum(speed[:, i] * motion[i, :, None] for i in range(len(links)))
-    return pose, jacobian
+    return pose, reduce(
+        jnp.add, (speed[:, i] * motion[i, :, None] for i in range(len(links)))
+    )
 
 
 def rotation_of(quat: jax.Array) -> jax.Array:
@@ -127,12 +139,11 @@ def _compose(a: jax.Array, b: jax.Array) -> jax.Array:
 
 
 def _attach(
-    scene: Scene, world: World, q: jax.Array, poses: jax.Array, rows: range
+    scene: Scene, world: World, q: jax.Array, poses: jax.Array, rows: list[int]
 ) -> jax.Array:
     """Fills in the poses of some links, each from its parent's."""
-    if not rows:
-        return poses
-    model, links = scene.model, scene.structure.links[rows.start - 1 : rows.stop - 1]
+    model = scene.model
+    links = tuple(scene.structure.links[row - 1] for row in rows)
     body = np.array([link.body for link in links])
     joint = np.array([link.joint for link in links])
     start = np.array([link.offset for link in links])
@@ -175,12 +186,15 @@ def _values(
     scene: Scene, world: World, q: jax.Array, links: tuple[Link, ...]
 ) -> jax.Array:
     """`[n, B]` how far each joint is from its reference; 0 where there is none."""
-    address = np.array([scene.mj_model.jnt_qposadr[link.joint] for link in links], int)
+    dependent = scene.structure.dependent
     variable = np.array([link.variable for link in links], int)
     passive = jnp.broadcast_to(world.passive, (len(scene.passive), q.shape[-1]))
-    values = jnp.concatenate([q, passive])[variable]
+    address = scene.addresses((*scene.joints, *scene.passive))
     reference = jnp.asarray(scene.model.qpos0)[address]
-    return jnp.where(variable[:, None] >= 0, values - reference[:, None], 0)
+    moved = jnp.concatenate([q, passive]) - reference[:, None]
+    if dependent:
+        moved = jnp.stack(follow(dependent, moved))
+    return jnp.where(variable[:, None] >= 0, moved[variable], 0)
 
 
 def _line(scene: Scene, body: str) -> Scene:

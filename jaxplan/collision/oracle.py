@@ -66,6 +66,9 @@ def mujoco_model(scene: Scene, reach: float = 0.0) -> mujoco.MjModel:
     model.opt.disableflags |= flags.mjDSBL_MIDPHASE
     model.opt.disableflags &= ~(flags.mjDSBL_CONTACT | flags.mjDSBL_CONSTRAINT)
     model.opt.enableflags = 0
+    # Flexes that are in the scene touch nothing that counts, and are in no contact's geoms.
+    for bits in (model.flex_contype, model.flex_conaffinity, model.flex_selfcollide):
+        bits[:] = 0
     for margin in _margins(model):
         margin[:] = reach
     model.geom_gap[:] = model.pair_gap[:] = 0

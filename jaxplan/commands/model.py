@@ -5,8 +5,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from jaxplan.collision import World, make_world
-from jaxplan.collision.world import object_address
+from jaxplan import collision
+from jaxplan.collision import World, world_at_key
+from jaxplan.collision.positions import couple
 from jaxplan.scene import Scene
 from jaxplan.scene.names import known
 
@@ -19,6 +20,8 @@ class Pose(NamedTuple):
     """`[d]` [rad or m]."""
     qpos: np.ndarray
     """`[nq]` all of the model's; as in the key frame or the reference pose."""
+    key: int | None = None
+    """The key frame's id."""
 
 
 def read_scene(path: Path, joints: str | None, hand: str | None) -> Scene:
@@ -52,10 +55,10 @@ def read_pose(scene: Scene, text: str, role: str) -> Pose:
                 f"{role}: no key frame {text!r}, the model has none; give {d} numbers"
             )
         try:
-            qpos = model.key(known(text, "key frame", keys)).qpos.copy()
+            key = model.key(known(text, "key frame", keys)).id
         except ValueError as error:
             raise ValueError(f"{role}: {error}") from None
-        return Pose(repr(text), qpos[scene.addresses(scene.joints)], qpos)
+        return _at_key(scene, key)
     if wrong := [part for part in parts if not _is_number(part)]:
         raise ValueError(f"{role}: {wrong[0]!r} is not a number")
     if len(parts) != d:
@@ -75,30 +78,31 @@ def default_pose(scene: Scene) -> Pose:
     model = scene.mj_model
     keys = [model.key(i).name for i in range(model.nkey)]
     if keys:
-        key = keys.index("home") if "home" in keys else 0
-        qpos = model.key(key).qpos.copy()
-        return Pose(repr(keys[key]), qpos[scene.addresses(scene.joints)], qpos)
+        return _at_key(scene, keys.index("home") if "home" in keys else 0)
     return Pose(
         "reference", model.qpos0[scene.addresses(scene.joints)], model.qpos0.copy()
     )
 
 
 def world_at(scene: Scene, pose: Pose) -> World:
-    """Fingers and objects where the pose has them."""
-    world = make_world(scene, passive=pose.qpos[scene.addresses(scene.passive)])
-    objects = np.array(world.object_pose)
-    for row, name in enumerate(scene.objects):
-        if name not in scene.mocap:
-            start = object_address(scene, name)
-            objects[row] = pose.qpos[start : start + 7]
-    return make_world(scene, objects, passive=world.passive)
+    """Fingers, objects and mocap bodies where the pose has them."""
+    if pose.key is not None:
+        return world_at_key(scene, pose.key)
+    return collision.world_at(scene, pose.qpos)
 
 
 def with_joints(scene: Scene, qpos: np.ndarray, q: np.ndarray) -> np.ndarray:
     """`[T, nq]`: `qpos [nq]` with the arm at `q [T, d]`."""
     rows = np.tile(qpos, (len(q), 1))
     rows[:, scene.addresses(scene.joints)] = q
+    couple(scene, rows)
     return rows
+
+
+def _at_key(scene: Scene, key: int) -> Pose:
+    found = scene.mj_model.key(key)
+    qpos = found.qpos.copy()
+    return Pose(repr(found.name), qpos[scene.addresses(scene.joints)], qpos, key)
 
 
 def _is_number(text: str) -> bool:

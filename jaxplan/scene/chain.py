@@ -1,11 +1,52 @@
 """The arm in a kinematic tree: which joints are its own, and where its hand is."""
 
+from collections.abc import Collection, Sequence
+
 import mujoco
 import numpy as np
+
+from jaxplan.scene.dependent import Drive, read_drives, turn_to
+from jaxplan.scene.names import known
 
 SIMPLE_JOINTS = int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE)
 GRIPPER = "gripper", "finger", "jaw"
 """Words in the name of a joint that opens a hand."""
+
+
+def read_arm(
+    model: mujoco.MjModel, names: tuple[str, ...], joints: Sequence[str] | None
+) -> tuple[list[int], dict[int, Drive]]:
+    """Ids of the arm's joints, and what drives those that are dependent.
+
+    A joint that follows another is the arm's only if that can follow it instead. If
+    `joints` is None it is left out otherwise, else refused.
+
+    Args:
+        model: The model.
+        names: Of joints, by id.
+        joints: The arm's.
+
+    Raises:
+        ValueError: One of them is not in the model, or cannot be planned for.
+    """
+    given = arm_joints(model, names) if joints is None else joints
+    arm = [names.index(known(name, "joint", names)) for name in given]
+    for name, joint in zip(given, arm, strict=True):
+        if model.jnt_type[joint] not in SIMPLE_JOINTS:
+            raise ValueError(f"joint {name!r} is neither a hinge nor a slide")
+        if arm.count(joint) > 1:
+            raise ValueError(f"joint {name!r} is given twice")
+    drives = read_drives(model, names)
+    for joint in [*arm]:
+        try:
+            drives = turn_to(drives, joint, arm, names)
+        except ValueError:
+            if joints is not None:
+                raise
+            arm.remove(joint)
+    if not arm:
+        raise ValueError("the model has no hinge or slide joint to plan for")
+    return arm, drives
 
 
 def arm_joints(model: mujoco.MjModel, names: tuple[str, ...]) -> tuple[str, ...]:
@@ -35,9 +76,19 @@ def arm_joints(model: mujoco.MjModel, names: tuple[str, ...]) -> tuple[str, ...]
     return tuple(names[j] for j in arm)
 
 
-def last_body(model: mujoco.MjModel, body: int) -> int:
-    """The last body below `body` before another joint or a branch; itself if all is rigid."""
-    lines = [set(line(model, model.body_parentid[h])) for h in _heads(model, body)]
+def last_body(model: mujoco.MjModel, body: int, following: Collection[int]) -> int:
+    """The last body below `body` before another joint or a branch; itself if all is rigid.
+
+    Args:
+        model: The model.
+        body: Where the arm's last joint is.
+        following: Ids of the joints that follow the arm's: they belong to the arm.
+    """
+    heads = _heads(model, body)
+    while len(heads) == 1 and set(simple_joints(model, heads[0])) <= set(following):
+        body = heads[0]
+        heads = _heads(model, body)
+    lines = [set(line(model, model.body_parentid[head])) for head in heads]
     # Ids grow down the tree: the greatest common one is the last before a branch.
     return max(set.intersection(*lines)) if lines else body
 

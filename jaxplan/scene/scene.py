@@ -13,32 +13,18 @@ import dataclasses
 from collections.abc import Iterable, Mapping, Sequence
 from functools import partial
 from os import PathLike
-from typing import NamedTuple
 
 import jax
-import jax.numpy as jnp
 import mujoco
 import numpy as np
 
 from jaxplan.scene.chain import line
 from jaxplan.scene.contacts import geom_pairs
-from jaxplan.scene.names import known
+from jaxplan.scene.limits import arm_limits, circular, rates
+from jaxplan.scene.names import known, pair_of, shortened
+from jaxplan.scene.numbers import Numbers, read_numbers
 from jaxplan.scene.source import SLOTS, compile_model
 from jaxplan.scene.structure import Group, Slot, Structure, read_structure
-
-
-class Numbers(NamedTuple):
-    """The arrays of an `MjModel` that planning reads, under MuJoCo's names and shapes."""
-
-    body_pos: jax.Array
-    body_quat: jax.Array
-    geom_pos: jax.Array
-    geom_quat: jax.Array
-    geom_size: jax.Array
-    jnt_pos: jax.Array
-    jnt_axis: jax.Array
-    jnt_range: jax.Array
-    qpos0: jax.Array
 
 
 @partial(
@@ -46,7 +32,7 @@ class Numbers(NamedTuple):
     data_fields=["model"],
     meta_fields=["structure"],
 )
-@dataclasses.dataclass(frozen=True, eq=False)
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class Scene:
     """A pytree: the numbers are its data, the structure is static."""
 
@@ -69,7 +55,8 @@ class Scene:
                 that are not the gripper's, on the longest way down from the world. It
                 ends where the tree branches into parts with no more joints than stand
                 above (fingers), and before joints at the very end that are called
-                gripper, finger or jaw.
+                gripper, finger or jaw. Joints that follow others by an <equality><joint>
+                are none of the arm's, unless those can follow them.
             hand: The body that carries what is held. None: the last body before another
                 joint or a branch follows, from that of the last of `joints` on.
             slots: Room for obstacles that change between queries: how many of each kind
@@ -81,13 +68,16 @@ class Scene:
             ValueError: The file is no valid model, or a number in it is not finite; a
                 joint or body is not in it, or cannot be planned for; `joints` is None
                 and several chains are longest; a geom that can touch the arm is a height
-                field, a flex or an SDF.
+                field, a flex or an SDF; the arm's joints are tied by a loop or a tendon,
+                or leave no values to joints that follow them.
         """
         slots = slots or {}
         model = compile_model(source, slots)
-        numbers = Numbers(*(jnp.asarray(getattr(model, f)) for f in Numbers._fields))
         names = SLOTS if any(slots.values()) else None
-        return cls(numbers, read_structure(model, joints, hand, names))
+        structure = read_structure(model, joints, hand, names)
+        numbers = read_numbers(model)
+        arm_limits(structure, numbers)  # raises where a joint has no room
+        return cls(numbers, structure)
 
     def replace(self, **fields: jax.Array) -> "Scene":
         """The scene with some of its `Numbers` replaced, e.g. `geom_pos`.
@@ -119,6 +109,13 @@ class Scene:
         return self.structure.passive
 
     @property
+    def dependent(self) -> tuple[str, ...]:
+        """Joints that follow the arm's or passive ones by an <equality><joint>."""
+        return tuple(
+            self.structure.joint_names[d.joint] for d in self.structure.dependent
+        )
+
+    @property
     def objects(self) -> tuple[str, ...]:
         """Bodies with a free joint, then mocap bodies: `World.object_pose` places them."""
         return self.structure.objects
@@ -127,6 +124,13 @@ class Scene:
     def mocap(self) -> tuple[str, ...]:
         """Mocap bodies, the last of the objects: they can be placed but not held."""
         return self.structure.mocap
+
+    @property
+    def bases(self) -> tuple[str, ...]:
+        """Objects on which the arm hangs: they stand where they are placed, never held."""
+        bodies = self.structure.moved | {self.body_id(self.hand)}
+        above = {body for moved in bodies for body in self.line(moved)}
+        return tuple(name for name in self.objects if self.body_id(name) in above)
 
     @property
     def slots(self) -> tuple[Slot, ...]:
@@ -145,18 +149,34 @@ class Scene:
 
     @property
     def q_min(self) -> jax.Array:
-        """`[d]` lower joint limits [rad or m]; -inf where a joint has none."""
-        return self._limits(0, -jnp.inf)
+        """`[d]` lower joint limits [rad or m]; -inf where a joint has none.
+
+        Within them, all joints that follow the arm's are inside their own limits.
+        """
+        return arm_limits(self.structure, self.model)[0]
 
     @property
     def q_max(self) -> jax.Array:
         """`[d]` upper joint limits [rad or m]; inf where a joint has none."""
-        return self._limits(1, jnp.inf)
+        return arm_limits(self.structure, self.model)[1]
 
-    def _limits(self, side: int, unlimited: float) -> jax.Array:
-        ids = np.array([self.joint_id(name) for name in self.joints])
-        limited = self.mj_model.jnt_limited[ids] != 0
-        return jnp.where(limited, self.model.jnt_range[ids, side], unlimited)
+    @property
+    def circular(self) -> np.ndarray:
+        """`[d]` bool: joints that come back to where they were after a full turn.
+
+        These are hinges without limits, their own or those of joints that follow them,
+        provided that what follows them comes back too. If it does not (a gear of 2 : 5, a
+        spindle), each value of the joint is another configuration, on a line without ends.
+        """
+        return circular(self.structure)
+
+    @property
+    def rates(self) -> np.ndarray:
+        """`[n, d]` how far each joint moves at most while one of the arm's moves by 1.
+
+        Of all hinges and slides (`Structure.variables`), within the limits.
+        """
+        return rates(self.structure, self.model)
 
     def joint_id(self, name: str) -> int:
         """MuJoCo's id of a joint; joints without a name are called joint4, after theirs."""
@@ -175,9 +195,8 @@ class Scene:
 
     @property
     def arm_bodies(self) -> set[int]:
-        """Ids of the bodies on which the arm's joints are."""
-        ids = [self.joint_id(name) for name in self.joints]
-        return {int(body) for body in self.mj_model.jnt_bodyid[ids]}
+        """Ids of the bodies on which the arm's joints are, and those that follow them."""
+        return set(self.structure.moved)
 
     def line(self, body: int) -> list[int]:
         """Ids of the body, its parent and so on, without the world."""
@@ -188,21 +207,25 @@ class Scene:
         kind = self.mj_model.jnt_type[self.joint_id(name)]
         return "slide" if kind == mujoco.mjtJoint.mjJNT_SLIDE else "hinge"
 
-    def ignored(self, names: Iterable[str]) -> np.ndarray:
+    def ignored(self, names: Iterable[str | tuple[str, str]]) -> np.ndarray:
         """`[n_groups]` mask of contact groups, for `World.ignored`.
 
         Args:
-            names: Pairs of bodies, "hand|mug" or "mug|hand"; geoms that hang on no
-                body of their own belong to "world".
+            names: Pairs of bodies, "hand|mug" or ("hand", "mug") in either order; geoms
+                that hang on no body of their own belong to "world". Pairs that are not
+                checked anyway may be named.
 
         Raises:
-            ValueError: There is no such group.
+            ValueError: There is no such body.
         """
-        every = [group.name for group in self.groups]
-        mask = np.zeros(len(every), bool)
+        bodies = self.structure.body_names
+        groups = [
+            {bodies[side.body] for side in group.contacts[0]} for group in self.groups
+        ]
+        mask = np.zeros(len(groups), bool)
         for name in names:
-            ordered = "|".join(sorted(name.split("|")))
-            mask[every.index(known(ordered, "contact group", every))] = True
+            pair = set(pair_of(name, bodies, [group.name for group in self.groups]))
+            mask |= [pair == group for group in groups]
         return mask
 
     @property
@@ -230,3 +253,9 @@ class Scene:
         body = model.geom_bodyid[geom]
         number = geom - model.body_geomadr[body]
         return model.geom(geom).name or f"{self.structure.body_names[body]}[{number}]"
+
+    def __repr__(self) -> str:
+        return (
+            f"Scene(joints: {shortened(self.joints)}; objects: {shortened(self.objects)}; "
+            f"{len(self.pairs)} pairs; {len(self.slots)} slots)"
+        )
