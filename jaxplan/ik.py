@@ -40,7 +40,7 @@ class Solutions(NamedTuple):
     distance: np.ndarray
     """`[n]` of each to the reference, Euclidean."""
     blocked: np.ndarray
-    """`[k, d]` others that reach the pose as well, and are not free."""
+    """`[k, d]` others that reach the pose as well, and are not free, in the same order."""
 
 
 def inverse_kinematics(
@@ -55,9 +55,10 @@ def inverse_kinematics(
 ) -> Solutions:
     """Configurations that bring a body to a pose, by damped least squares from many starts.
 
-    The starts spread from the reference over all that the joints can do; a redundant arm's
-    solutions are a sample of their continuum. Joints that do not move the body stay at the
-    reference. Compiles once for each body of a scene.
+    The starts spread from the reference over all that the joints can do. Where there are
+    more than `count` solutions (a redundant arm has a continuum), these are the nearest to
+    the reference and others far from each other. Joints that do not move the body stay at
+    the reference. Compiles once for each body of a scene.
 
     Args:
         scene: The scene.
@@ -66,7 +67,7 @@ def inverse_kinematics(
         limits: Kept exactly; the model's where None.
         reference: `[d]` [rad or m]; the model's reference pose within the limits where None.
         seed: Of the starts.
-        count: Solutions at most, at least 1.
+        count: Solutions at most, free ones and others each; at least 1.
         config_free: `[B, d] -> [B]` bool, B always the same; without it all are free.
 
     Raises:
@@ -92,10 +93,9 @@ def inverse_kinematics(
         if free.any():
             break
     q, blocked = (
-        _sorted(np.concatenate(part), limits, reference)
+        _spread(np.concatenate(part), limits, reference, count)
         for part in zip(*found, strict=True)
     )
-    q = q[:count]
     return Solutions(q, np.linalg.norm(q - reference, axis=1), blocked)
 
 
@@ -205,15 +205,20 @@ def _within(q: np.ndarray, limits: Limits, reference: np.ndarray) -> np.ndarray:
     return np.clip(q - 2 * np.pi * turns, limits.q_min, limits.q_max)
 
 
-def _sorted(q: np.ndarray, limits: Limits, reference: np.ndarray) -> np.ndarray:
-    """By distance to the reference, without those that are the same as one before."""
+def _spread(
+    q: np.ndarray, limits: Limits, reference: np.ndarray, count: int
+) -> np.ndarray:
+    """The nearest to the reference, then always the one farthest from those before.
+
+    Returns:
+        `[<= count, d]` by distance to the reference, none the same as another.
+    """
     q = _within(q, limits, reference)
     q = q[np.argsort(np.linalg.norm(q - reference, axis=1), kind="stable")]
-    apart = np.abs(q[:, None] - q)
-    turn = np.where(limits.circular, np.minimum(apart, 2 * np.pi - apart), apart)
-    same = np.asarray(turn <= SAME).all(-1)
-    kept: list[int] = []
-    for row in range(len(q)):
-        if not same[row, kept].any():
-            kept.append(row)
-    return q[kept]
+    kept, gap = [], np.full(len(q), np.inf)
+    while len(kept) < count and gap.max(initial=0) > SAME:
+        kept.append(int(gap.argmax()))
+        apart = np.abs(q - q[kept[-1]])
+        around = np.where(limits.circular, np.minimum(apart, 2 * np.pi - apart), apart)
+        gap = np.minimum(gap, around.max(1))
+    return q[sorted(kept)]
