@@ -17,6 +17,8 @@ from jaxplan.collision.kinematics import frame_jacobian, rotation_of
 from jaxplan.pose import Region
 from jaxplan.scene import Scene
 
+FLOAT = jnp.float32
+"""Whatever the caller computes in."""
 LANES = 256
 """Starts in a call: so few that XLA on CPU keeps to one core, and threads to theirs."""
 ITERATIONS = 12
@@ -79,9 +81,11 @@ def descend(
     Returns:
         `[B, d]` joints, and `[B]` whether they bring the body into its region.
     """
-    world = jax.tree.map(lambda leaf: leaf[..., None], world)
-    window = Window(*(jnp.asarray(leaf, jnp.float32)[:, None] for leaf in window))
-    accuracy = jnp.minimum(region.tolerance, jnp.array(ACCURACY)[:, None])
+    scene, world, region, window, spread = jax.tree.map(
+        _single, (scene, world, region, window, spread)
+    )
+    world, window = jax.tree.map(lambda leaf: leaf[..., None], (world, window))
+    accuracy = jnp.minimum(region.tolerance, jnp.array(ACCURACY, FLOAT)[:, None])
 
     def at(q: jax.Array) -> Misfit:
         # Walls, or XLA on CPU computes the arm again for every use.
@@ -109,8 +113,8 @@ def descend(
     key = jax.random.fold_in(jax.random.key(seed), call)
     q = _starts(key, at, window, jnp.asarray(spread))
     d, lanes = q.shape
-    nowhere = Misfit(jnp.full((6, lanes), jnp.inf), jnp.zeros((6, d, lanes)))
-    damping = jnp.full(lanes, DAMPING / EASE)
+    error, slope = jnp.full((6, lanes), jnp.inf, FLOAT), jnp.zeros((6, d, lanes), FLOAT)
+    nowhere, damping = Misfit(error, slope), jnp.full(lanes, DAMPING / EASE, FLOAT)
     state = 0, q, q, nowhere, damping, jnp.zeros(lanes, bool)
     _, _, q, misfit, _, _ = jax.lax.while_loop(
         lambda state: (state[0] <= ITERATIONS) & ~state[-1].all(), go, state
@@ -123,7 +127,7 @@ def _starts(
 ) -> jax.Array:
     """`[d, B]` for each lane the nearest of some configurations."""
     shape = CANDIDATES, len(window.low), len(spread)
-    drawn = jax.random.uniform(key, shape, minval=window.first, maxval=window.last)
+    drawn = jax.random.uniform(key, shape, FLOAT, window.first, window.last)
     drawn = window.reference + spread * (drawn - window.reference)
 
     def nearer(best: tuple, q: jax.Array) -> tuple:
@@ -131,7 +135,7 @@ def _starts(
         keep = best[0] <= distance
         return (jnp.where(keep, best[0], distance), jnp.where(keep, best[1], q)), None
 
-    best = jnp.full(len(spread), jnp.inf), drawn[0]
+    best = jnp.full(len(spread), jnp.inf, FLOAT), drawn[0]
     return jax.lax.scan(nearer, best, jnp.asarray(drawn))[0][1]
 
 
@@ -149,7 +153,7 @@ def _step(
     for _ in range(2):
         slope = jnp.where(locked, 0, slope)
         square = _sum(slope[:, None, j] * slope[None, :, j] for j in range(len(q)))
-        square = square + damping * jnp.eye(6)[..., None]
+        square = square + damping * jnp.eye(6, dtype=FLOAT)[..., None]
         force = _solve(jax.lax.optimization_barrier(square), error)
         step = -_sum(slope[i] * force[i] for i in range(6))
         out = (q + step < window.low) | (q + step > window.high)
@@ -210,6 +214,12 @@ def _turn(
     sine = jnp.where(free, jnp.cross(then, now, axis=0), whole)
     trace = r[0, 0] + r[1, 1] + r[2, 2]
     return sine, jnp.where(free, _dot(then, now), (trace - 1) / 2), then
+
+
+def _single(leaf: jax.typing.ArrayLike) -> jax.Array:
+    """In single precision; flags stay flags."""
+    leaf = jnp.asarray(leaf)
+    return leaf if leaf.dtype == bool else leaf.astype(FLOAT)
 
 
 def _solve(matrix: jax.Array, right: jax.Array) -> jax.Array:

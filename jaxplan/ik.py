@@ -66,7 +66,7 @@ def inverse_kinematics(
         pose: What is wanted.
         limits: Kept exactly; the model's where None.
         reference: `[d]` [rad or m]; the model's reference pose within the limits where None.
-        seed: Of the starts.
+        seed: Of the starts, from 0 to 2^32 - 1.
         count: Solutions at most, free ones and others each; at least 1.
         config_free: `[B, d] -> [B]` bool, B always the same; without it all are free.
 
@@ -86,7 +86,7 @@ def inverse_kinematics(
     for call in range(ROUNDS):
         q, reached = map(
             np.asarray,
-            descend(scene, world, body, region, window, seed, call, spread),
+            descend(scene, world, body, region, window, np.uint32(seed), call, spread),
         )
         free = reached if config_free is None else reached & np.asarray(config_free(q))
         found.append((q[free], q[reached & ~free]))
@@ -115,7 +115,7 @@ def inverse_kinematics_batch(
         poses: P, all of one body.
         limits: As in `inverse_kinematics`.
         reference: As there.
-        seed: Of the starts.
+        seed: Of the starts, from 0 to 2^32 - 1.
 
     Returns:
         `[P, d]` joints [rad or m], and `[P]` bool whether they reach their pose.
@@ -135,7 +135,9 @@ def inverse_kinematics_batch(
 
     def attempt(call: int, rows: np.ndarray) -> tuple[np.ndarray, ...]:
         part = Region(*(leaf[:, rows] for leaf in region))
-        answer = descend(scene, world, body, part, window, seed, call, spread)
+        answer = descend(
+            scene, world, body, part, window, np.uint32(seed), call, spread
+        )
         return rows, *map(np.asarray, answer)
 
     calls = 0

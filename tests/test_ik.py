@@ -67,7 +67,7 @@ MILLIMETRE, TENTH = 1e-3, math.radians(0.1)
 
 @pytest.fixture(scope="module")
 def scene() -> Scene:
-    return Scene.from_mjcf(ARM, joints=JOINTS)
+    return Scene.from_mjcf(ARM, joints=JOINTS, hand="hand")
 
 
 @pytest.fixture(scope="module")
@@ -222,6 +222,24 @@ def test_a_world_of_each_row(scene):
         np.testing.assert_allclose(pose[i, :, :3].ravel(), frame.xmat, atol=2e-6)
 
 
+def test_what_the_hand_holds_has_a_frame_too(scene):
+    held = [[0.1, 0, 0.2, 0.6, 0, 0.8, 0]]
+    world = make_world(scene, object_pose=held, held=[True], passive=[0.05])
+    pose = np.asarray(jax.jit(frame_pose, static_argnums=3)(scene, world, Q, "mug"))
+    hand = placed(scene, Q, [0.05]).body("hand")
+    position, quaternion, turn = np.zeros(3), np.zeros(4), np.zeros(9)
+    mujoco.mju_mulPose(
+        position,
+        quaternion,
+        hand.xpos,
+        hand.xquat,
+        np.array(held[0][:3]),
+        np.array(held[0][3:]),
+    )
+    mujoco.mju_quat2Mat(turn, quaternion)
+    np.testing.assert_allclose(pose, np.c_[turn.reshape(3, 3), position], atol=2e-6)
+
+
 REGIONS = {
     "pose": {},
     "point": {"offset": (0.1, -0.05, 0.2)},
@@ -364,7 +382,8 @@ def test_solutions_that_are_not_free_are_named_apart(scene, world):
 def test_the_seed_decides(scene, world):
     pose = pose_at(placed(scene, Q, [0.05]), "hand")
     first, again, other = (
-        inverse_kinematics(scene, world, pose, seed=seed).q for seed in (1, 1, 2)
+        inverse_kinematics(scene, world, pose, seed=seed).q
+        for seed in (1, 1, 2**32 - 1)
     )
     np.testing.assert_array_equal(first, again)
     assert first.shape != other.shape or not np.array_equal(first, other)
@@ -424,6 +443,25 @@ def test_mink_finds_nothing_that_we_do_not(scene, world):
     _, ours = inverse_kinematics_batch(scene, world, poses)
     assert theirs.sum() > 20
     assert not (theirs & ~ours).any()
+
+
+def test_an_arm_on_a_floating_base():
+    """The base stays where the world has it."""
+    scene = Scene.from_mjcf(
+        """<mujoco><default><geom size="0.01"/></default><worldbody>
+        <body name="base"><freejoint/><geom/>
+          <body><joint name="a" axis="0 0 1"/><geom/>
+            <body pos="1 0 0"><joint name="b" axis="0 0 1"/><geom/>
+              <body name="hand" pos="1 0 0"><geom/></body>
+        </body></body></body></worldbody></mujoco>""",
+        joints=["a", "b"],
+    )
+    world = make_world(scene, object_pose=[[5, 0, 0, 0.6, 0, 0, 0.8]])
+    pose = Pose("hand", (5, 1.5, 0), position_tolerance=1e-4)
+    found = inverse_kinematics(scene, world, pose)
+    assert len(found.q) == 2  # elbow left, elbow right
+    frames = jax.jit(frame_pose, static_argnums=3)(scene, world, found.q, "hand")
+    np.testing.assert_allclose(frames[:, :, 3], [pose.position] * 2, atol=1e-4)
 
 
 def test_a_batch_of_none(scene, world):

@@ -5,6 +5,7 @@ into whatever uses it and computes the whole arm again for every sphere. The loo
 buffer is a wall that it does not cross.
 """
 
+import math
 from functools import reduce
 from itertools import groupby
 
@@ -12,7 +13,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxplan.collision.world import OWN_AXES, World, batch_last, batch_shape
+from jaxplan.collision.world import OWN_AXES, World, batch_shape
 from jaxplan.scene import Link, Scene, only_line
 from jaxplan.scene.dependent import follow
 
@@ -64,12 +65,17 @@ def frame_pose(scene: Scene, world: World, q: jax.Array, body: str) -> jax.Array
         ValueError: There is no such body, or it hangs on a ball joint.
     """
     shape = batch_shape(world, q)
-    leaves = zip(world, OWN_AXES, strict=True)
-    flat = World(*(batch_last(leaf, shape, own) for leaf, own in leaves))
-    rows = batch_last(jnp.broadcast_to(q, (*shape, q.shape[-1])), shape, 1)
+
+    def flat(leaf: jax.Array, own: int) -> jax.Array:
+        tail = leaf.shape[leaf.ndim - own :]
+        rows = jnp.broadcast_to(leaf, (*shape, *tail)).reshape(math.prod(shape), *tail)
+        return jnp.moveaxis(rows, 0, -1)
+
+    leaves = World(*map(flat, world, OWN_AXES))
     line = _line(scene, body)
-    poses = link_poses(line, flat, rows)[line.structure.link_of[scene.body_id(body)]]
-    return jnp.moveaxis(poses, -1, 0).reshape(*shape, 3, 4)
+    poses = link_poses(line, leaves, flat(q, 1))
+    pose = poses[line.structure.link_of[scene.body_id(body)]]
+    return jnp.moveaxis(pose, -1, 0).reshape(*shape, 3, 4)
 
 
 def frame_jacobian(
@@ -112,7 +118,7 @@ def frame_jacobian(
         along = jnp.broadcast_to(direction[:, None], q.shape)
         return jax.jvp(lambda q: _values(line, world, q, links), (q,), (along,))[1]
 
-    speed = jax.vmap(speeds)(jnp.eye(len(q)))
+    speed = jax.vmap(speeds)(jnp.eye(len(q), dtype=q.dtype))
     return pose, reduce(
         jnp.add, (speed[:, i] * motion[i, :, None] for i in range(len(links)))
     )

@@ -9,7 +9,7 @@ import jax.numpy as jnp
 from jaxplan.collision.engine import least_scores
 from jaxplan.collision.mjx_backend import least_distances
 from jaxplan.collision.narrow import Score
-from jaxplan.collision.world import OWN_AXES, World, batch_last, batch_shape
+from jaxplan.collision.world import OWN_AXES, World, batch_shape
 from jaxplan.scene import Scene
 
 Backend = Literal["fast", "mjx"]
@@ -110,10 +110,19 @@ def _flat(
     finite &= jnp.isfinite(world.passive).all(-1)
     finite &= jnp.isfinite(world.slot_size).all((-2, -1))
     leaves = zip(world, OWN_AXES, strict=True)
-    flat = World(*(batch_last(leaf, shape, own) for leaf, own in leaves))
-    rows = batch_last(jnp.broadcast_to(q, (*shape, q.shape[-1])), shape, 1)
+    flat = World(*(_batch_last(leaf, shape, own) for leaf, own in leaves))
+    rows = _batch_last(jnp.broadcast_to(q, (*shape, q.shape[-1])), shape, 1)
     if backend == "fast":
         scores = least_scores(scene, flat, rows, score)
     else:
         scores = least_distances(scene, flat, rows) - score.margin
     return jnp.where(finite, scores.reshape(shape), jnp.nan)
+
+
+def _batch_last(leaf: jax.Array, shape: tuple[int, ...], own: int) -> jax.Array:
+    """`[..., *own]` to `[*own, N]`, or to `[*own, 1]` if the whole batch shares it."""
+    tail = leaf.shape[leaf.ndim - own :]
+    if math.prod(leaf.shape[: leaf.ndim - own]) == 1:
+        return leaf.reshape(*tail, 1)
+    rows = jnp.broadcast_to(leaf, (*shape, *tail)).reshape(math.prod(shape), *tail)
+    return jnp.moveaxis(rows, 0, -1)

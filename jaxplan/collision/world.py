@@ -1,6 +1,5 @@
 """What changes between queries: where things are, what is held, what may touch."""
 
-import math
 from collections.abc import Iterable
 from typing import NamedTuple
 
@@ -165,15 +164,6 @@ def batch_shape(world: World, q: jax.Array | np.ndarray) -> tuple[int, ...]:
     leaves = zip(world, OWN_AXES, strict=True)
     shapes = [leaf.shape[: leaf.ndim - own] for leaf, own in leaves]
     return jnp.broadcast_shapes(q.shape[:-1], *shapes)
-
-
-def batch_last(leaf: jax.Array, shape: tuple[int, ...], own: int) -> jax.Array:
-    """`[..., *own]` to `[*own, N]`, or to `[*own, 1]` if the whole batch shares it."""
-    tail = leaf.shape[leaf.ndim - own :]
-    if math.prod(leaf.shape[: leaf.ndim - own]) == 1:
-        return leaf.reshape(*tail, 1)
-    rows = jnp.broadcast_to(leaf, (*shape, *tail)).reshape(math.prod(shape), *tail)
-    return jnp.moveaxis(rows, 0, -1)
 
 
 def object_address(scene: Scene, name: str) -> int:
