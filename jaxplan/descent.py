@@ -13,7 +13,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxplan.collision import XLA_OPTIONS, World
-from jaxplan.collision.kinematics import frame_jacobian, rotation_of
+from jaxplan.collision.kinematics import frame_jacobian, in_float32, rotation_of
 from jaxplan.pose import Region
 from jaxplan.scene import Scene
 
@@ -81,8 +81,8 @@ def descend(
     Returns:
         `[B, d]` joints, and `[B]` whether they bring the body into its region.
     """
-    scene, world, region, window, spread = jax.tree.map(
-        _single, (scene, world, region, window, spread)
+    scene, world, region, window, spread = in_float32(
+        (scene, world, region, window, spread)
     )
     world, window = jax.tree.map(lambda leaf: leaf[..., None], (world, window))
     accuracy = jnp.minimum(region.tolerance, jnp.array(ACCURACY, FLOAT)[:, None])
@@ -214,12 +214,6 @@ def _turn(
     sine = jnp.where(free, jnp.cross(then, now, axis=0), whole)
     trace = r[0, 0] + r[1, 1] + r[2, 2]
     return sine, jnp.where(free, _dot(then, now), (trace - 1) / 2), then
-
-
-def _single(leaf: jax.typing.ArrayLike) -> jax.Array:
-    """In single precision; flags stay flags."""
-    leaf = jnp.asarray(leaf)
-    return leaf if leaf.dtype == bool else leaf.astype(FLOAT)
 
 
 def _solve(matrix: jax.Array, right: jax.Array) -> jax.Array:

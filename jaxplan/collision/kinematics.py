@@ -8,6 +8,7 @@ buffer is a wall that it does not cross.
 import math
 from functools import reduce
 from itertools import groupby
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -64,6 +65,7 @@ def frame_pose(scene: Scene, world: World, q: jax.Array, body: str) -> jax.Array
     Raises:
         ValueError: There is no such body, or it hangs on a ball joint.
     """
+    scene, world, q = in_float32((scene, world, q))
     shape = batch_shape(world, q)
 
     def flat(leaf: jax.Array, own: int) -> jax.Array:
@@ -122,6 +124,16 @@ def frame_jacobian(
     return pose, reduce(
         jnp.add, (speed[:, i] * motion[i, :, None] for i in range(len(links)))
     )
+
+
+def in_float32(tree: Any) -> Any:
+    """The arrays of a pytree in float32, whatever the caller computes in; flags stay."""
+
+    def cast(leaf: jax.typing.ArrayLike) -> jax.Array:
+        leaf = jnp.asarray(leaf)
+        return leaf if leaf.dtype == bool else leaf.astype(jnp.float32)
+
+    return jax.tree.map(cast, tree)
 
 
 def rotation_of(quat: jax.Array) -> jax.Array:
