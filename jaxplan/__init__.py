@@ -9,6 +9,7 @@ from jaxplan.plan import Plan as Plan
 from jaxplan.planner import Planner as Planner
 from jaxplan.planning import Segment as Segment
 from jaxplan.planning import Status as Status
+from jaxplan.pose import Pose as Pose
 from jaxplan.scene import Scene as Scene
 
 __version__ = "0.1.0"

@@ -12,3 +12,5 @@ from jaxplan.scene.structure import Group as Group
 from jaxplan.scene.structure import Link as Link
 from jaxplan.scene.structure import Slot as Slot
 from jaxplan.scene.structure import Structure as Structure
+from jaxplan.scene.structure import movers as movers
+from jaxplan.scene.structure import only_line as only_line

@@ -178,6 +178,40 @@ def read_structure(
     )
 
 
+def only_line(structure: Structure, body: int) -> Structure:
+    """The structure with the links of one body's line only.
+
+    Where the hand may hold what the body hangs on, the hand's line is there too.
+    """
+    model, bodies = structure.mj_model, structure.body_names
+    hand = bodies.index(structure.hand)
+    objects = [bodies.index(name) for name in structure.objects]
+    needed = set(line(model, body))
+    if needed & set(objects):
+        needed |= set(line(model, hand))
+    links, link_of = _links(
+        model,
+        needed,
+        structure.joint_names,
+        structure.variables,
+        objects,
+        int(model.body_rootid[hand]),
+    )
+    return dataclasses.replace(structure, links=links, link_of=link_of)
+
+
+def movers(structure: Structure, body: int) -> np.ndarray:
+    """`[d]` bool: joints of the arm that move a body, by themselves or what follows them."""
+    model = structure.mj_model
+    above = np.isin(model.jnt_bodyid[list(structure.variables)], line(model, body))
+    first = len(structure.variables) - len(structure.dependent)
+    followers = list(enumerate(structure.dependent, first))
+    for own, (_, master, _) in reversed(followers):
+        if master >= 0:
+            above[master] |= above[own]
+    return above[: len(structure.joints)]
+
+
 def _groups(
     model: mujoco.MjModel,
     names: tuple[str, ...],
