@@ -10,6 +10,7 @@ from jaxplan.config import TrajectoryConfig
 from jaxplan.scene.panda import PANDA_LIMITS
 from jaxplan.trajectory import (
     Rung,
+    Validation,
     fit_polyline,
     fit_spline,
     make_trajectory,
@@ -132,11 +133,12 @@ def test_timing_is_nearly_the_best_of_a_fine_grid():
 @settings(max_examples=20, deadline=None)
 @given(seed=st.integers(0, 10**6))
 def test_shortcuts_are_free_and_never_longer(seed):
-    path, config_free = around(0.5), outside_ball(0.4)
+    path = around(0.5)
+    validation = Validation(outside_ball(0.4), None, CONFIG.check_rows, 0.01)
     noise = np.random.default_rng(seed).uniform(0, 0.2, path[1:-1].shape)
     path[1:-1] *= 1 + noise
     (short,) = shortcut(
-        [path], jax.vmap(jax.random.key)(np.array([seed])), config_free, CONFIG
+        [path], jax.vmap(jax.random.key)(np.array([seed])), validation, CONFIG
     )
     assert arc_length(short)[-1] < arc_length(path)[-1]
     np.testing.assert_array_equal(short[[0, -1]], path[[0, -1]])
