@@ -30,6 +30,7 @@ motion 0 it says whether q itself is free."""
 _SMALLEST = 1e-4  # [rad or m]; where no joint moves further, the middle says it all
 
 _LEFT = np.array([[8, 0, 0, 0], [4, 4, 0, 0], [2, 4, 2, 0], [1, 3, 3, 1]]) / 8.0
+_MIDDLE = _LEFT[-1]
 _HALVES = np.stack([_LEFT, _LEFT[::-1, ::-1]])
 """The control points of a cubic's halves from its own (de Casteljau)."""
 
@@ -69,27 +70,34 @@ class Validation:
         Returns:
             `Bool[K]`.
         """
-        free = np.ones(len(curves), bool)
-        if not free.size:
-            return free
+        if not curves:
+            return np.zeros(0, bool)
         pieces = [bezier(curve) for curve in curves]
         item = np.repeat(np.arange(len(pieces)), [len(chain) for chain in pieces])
-        world = np.asarray(problem, np.int32)
         item, piece = _shorter(item, np.concatenate(pieces), self.resolution)
-        while piece.size:
-            middle = _HALVES[0, -1] @ piece
+        world = np.asarray(problem, np.int32)
+        free = np.ones(len(curves), bool)
+        if self.swept_free is None:
+            middle = _MIDDLE @ piece
+            free[item[~self._asked(self.config_free, world[item], middle)]] = False
+            return free
+        # Middles of what was not proven are asked along with its parts: a call less.
+        doubted, doubt = item[:0], piece[:0, 0]
+        while len(piece) + len(doubt):
+            middle = _MIDDLE @ piece
             motion = np.abs(piece - middle[:, None]).max(axis=1)
-            if self.swept_free is not None:
-                proven = self._asked(self.swept_free, world[item], middle, motion)
-                item, piece, middle, motion = (
-                    rows[~proven] for rows in (item, piece, middle, motion)
-                )
-            at_rest = self._asked(self._at_rest, world[item], middle)
-            free[item[~at_rest]] = False
-            if self.swept_free is None:
-                break
-            open_ = free[item] & (motion.max(axis=1) > _SMALLEST)
-            item, piece = _halved(*_halved(item[open_], piece[open_]))
+            answers = self._asked(
+                self.swept_free,
+                world[np.concatenate([item, doubted])],
+                np.concatenate([middle, doubt]),
+                np.concatenate([motion, np.zeros_like(doubt)]),
+            )
+            left, clear = ~answers[: len(item)], answers[len(item) :]
+            free[doubted[~clear]] = False
+            left &= free[item]
+            doubted, doubt = item[left], middle[left]
+            left &= motion.max(axis=1) > _SMALLEST
+            item, piece = _halved(*_halved(item[left], piece[left]))
         return free
 
     def _at_rest(self, problem: np.ndarray, q: np.ndarray) -> ArrayLike:
