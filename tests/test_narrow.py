@@ -91,7 +91,8 @@ def shapes(model: mujoco.MjModel, name: str, poses: np.ndarray) -> Shapes:
     scene: Any = SimpleNamespace(model=model, mj_model=model)
     own = read(scene, (model.geom(name).id,))
     fill = [(0, HULL - len(own.vertices[0]) if own.vertices else 0), (0, 0), (0, 0)]
-    own = own._replace(vertices=[jnp.pad(x, fill, mode="edge") for x in own.vertices])
+    padded = (jnp.pad(x, fill, mode="edge") for x in own.vertices)
+    own = own._replace(vertices=tuple(padded))
     batch_last = jnp.asarray(np.moveaxis(poses, 0, -1)[None], jnp.float32)
     return in_world(own, batch_last, np.zeros(1, int))
 

@@ -83,11 +83,12 @@ def least_convex(
         if not len(rows):
             continue
         simple = set(kinds[[*a[rows], *b[rows]]]) <= {"sphere", "capsule", "box"}
-        tiles = partial(_in_tiles, cores, a[rows], b[rows], (one, other))
+        own = score._replace(margin=_of_pairs(score.margin, rows))
+        tiles = partial(_in_tiles, cores, a[rows], b[rows], (one, other), own.margin)
         thick = radius[rows]
-        close = tiles(_box_gap, near[rows], jnp.inf) - thick <= reach
-        found = tiles(partial(_squared, score), close, jnp.inf)
-        scores = score.of_squared(found, thick)
+        close = tiles(_box_gap, near[rows], jnp.inf) - thick <= _of_pairs(reach, rows)
+        found = tiles(partial(_squared, score.exact), close, jnp.inf)
+        scores = own.of_squared(found, thick)
         if score.exact:
             depth = partial(_depth, 0 if simple else ROUNDS)
             scores -= tiles(depth, found == 0, 0.0)
@@ -106,6 +107,11 @@ def _balls(cores: Cores, a: np.ndarray, b: np.ndarray) -> tuple[jax.Array, jax.A
     return least, distance - (cores.inner[a] + cores.inner[b])
 
 
+def _of_pairs(margin: jax.Array | float, rows: np.ndarray) -> jax.Array | float:
+    """The rows of what may be a number for each pair, `[P, B]`."""
+    return margin[rows] if isinstance(margin, jax.Array) and margin.ndim > 1 else margin
+
+
 class Pair(NamedTuple):
     """Geoms a and b in b's frame, where rounding is least; leaves `[tile]`."""
 
@@ -115,6 +121,8 @@ class Pair(NamedTuple):
     """From b's centre to a's [m]."""
     axes: list[Vector]
     """Those of a."""
+    margin: jax.Array | float
+    """`[tile]`, or one for all [m]."""
 
     def support(self, against: Vector) -> Vector:
         """The point of the a - b that lies farthest against a direction."""
@@ -131,6 +139,7 @@ def _in_tiles(
     a: np.ndarray,
     b: np.ndarray,
     meshes: tuple[bool, bool],
+    margin: jax.Array | float,
     function: Callable[[Pair], jax.Array],
     chosen: jax.Array,
     otherwise: float,
@@ -147,8 +156,13 @@ def _in_tiles(
             return leaf[rows, columns if leaf.shape[-1] > 1 else 0]
 
         picked = jax.tree.map(one, cores._replace(vertices=()))
-        vertices = [x[:, rows, 0] for x in cores.vertices] if mesh else ()
-        return picked._replace(vertices=vertices)
+        vertices = (x[:, rows, 0] for x in cores.vertices if mesh)
+        return picked._replace(vertices=tuple(vertices))
+
+    def own_margin(rows: jax.Array, columns: jax.Array) -> jax.Array | float:
+        if not isinstance(margin, jax.Array) or margin.ndim == 0:
+            return margin
+        return margin[rows, columns if margin.shape[-1] > 1 else 0]
 
     def search(state: tuple[jax.Array, jax.Array]) -> tuple[jax.Array, jax.Array]:
         done, values = state
@@ -159,10 +173,10 @@ def _in_tiles(
         offset = [dot(axis, minus(one.centre, other.centre)) for axis in other.axes]
         axes = [[dot(axis, own) for axis in other.axes] for own in one.axes]
         offset, axes = once((offset, axes))
-        found = function(Pair(one, other, offset, axes))
+        found = function(Pair(one, other, offset, axes, own_margin(row, column)))
         return done + tile, values.at[places].set(found, mode="drop")
 
-    values = jnp.full(size, otherwise)
+    values = jnp.full(size, otherwise, cores.radius.dtype)
     start = jnp.array(0), values
     _, values = jax.lax.while_loop(lambda state: state[0] < count, search, start)
     return values.reshape(chosen.shape)
@@ -180,9 +194,9 @@ def _box_gap(pair: Pair) -> jax.Array:
     return jnp.where(gap > 0, gap, -jnp.inf)  # boxes that meet say nothing of depth
 
 
-def _squared(score: Score, pair: Pair) -> jax.Array:
+def _squared(exact: bool, pair: Pair) -> jax.Array:
     """Squared distance of the cores, `[tile]` [m^2]."""
-    reach = None if score.exact else pair.a.radius + pair.b.radius + score.margin
+    reach = None if exact else pair.a.radius + pair.b.radius + pair.margin
     return nearest_point(pair.support, pair.offset, reach)[1]
 
 

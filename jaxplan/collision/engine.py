@@ -5,7 +5,7 @@ minimum instead of boolean reductions (performance: 10x over the plain form).
 """
 
 from collections import defaultdict
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import reduce
 from typing import Any, NamedTuple
 
@@ -16,6 +16,7 @@ import numpy as np
 from jaxplan.collision.convex import least_convex
 from jaxplan.collision.kinematics import link_poses, rotation_of
 from jaxplan.collision.narrow import CLOSED
+from jaxplan.collision.reach import Extent, extents, find_ways, travel_from
 from jaxplan.collision.shapes import (
     Score,
     Shapes,
@@ -58,7 +59,13 @@ class ConvexPairs(NamedTuple):
     """Contact group of each pair."""
 
 
-def least_scores(scene: Scene, world: World, q: jax.Array, score: Score) -> jax.Array:
+def least_scores(
+    scene: Scene,
+    world: World,
+    q: jax.Array,
+    score: Score,
+    motion: jax.Array | None = None,
+) -> jax.Array:
     """Least score over all pairs that count.
 
     Args:
@@ -66,12 +73,14 @@ def least_scores(scene: Scene, world: World, q: jax.Array, score: Score) -> jax.
         world: Leaves with the batch last, `[..., N]` or `[..., 1]`.
         q: `[d, N]` joints.
         score: What is rated.
+        motion: `[d, N]` each joint may be this far from q [rad or m]; what the geoms of a
+            pair may come closer by is part of the pair's margin.
 
     Returns:
         `[N]`.
     """
     if not scene.groups:
-        return jnp.full(q.shape[-1], jnp.inf)
+        return jnp.full(q.shape[-1], jnp.inf, q.dtype)
     fronts, pairs = _fronts(scene), _convex_pairs(scene)
     slots = {slot.geom: index for index, slot in enumerate(scene.slots)}
 
@@ -80,19 +89,20 @@ def least_scores(scene: Scene, world: World, q: jax.Array, score: Score) -> jax.
             return _in_slots(world, [slots[geom] for geom in ids])
         return read(scene, ids)
 
-    def scores(front: Front, poses: jax.Array, world: World) -> jax.Array:
+    def scores(front: Front, poses: jax.Array, world: World, score: Score) -> jax.Array:
         own = in_world(shapes(front.facing, world), poses, np.array(front.links))
         function = CLOSED[front.kinds]
         if front.obstacles[0].ids[0] in slots:
-            (obstacles,) = front.obstacles
-            rows = [slots[geom] for geom in obstacles.ids]
+            rows = [slots[geom] for o in front.obstacles for geom in o.ids]
             return _least_over_slots(function, own, world, rows, score)
         frame = poses[scene.structure.link_of[front.obstacles[0].body]]
         near = seen_from(own, frame)
         rated = [function(near, shapes(o.ids, world), score) for o in front.obstacles]
         return reduce(smaller, rated)
 
-    def convex(poses: jax.Array, world: World, counts: jax.Array) -> jax.Array:
+    def convex(
+        poses: jax.Array, world: World, counts: jax.Array, score: Score
+    ) -> jax.Array:
         parts, row = [], {}
         for (kind, moves), ids in pairs.geoms.items():
             own = shapes(ids, world)
@@ -106,19 +116,43 @@ def least_scores(scene: Scene, world: World, q: jax.Array, score: Score) -> jax.
         rows = np.array([[row[a], row[b]] for a, b in pairs.pairs])
         return least_convex(parts, rows, counts[np.array(pairs.groups)], score)
 
-    def block(q: jax.Array, world: World) -> jax.Array:
+    def block(
+        q: jax.Array, world: World, motion: jax.Array | None, extent: Extent | None
+    ) -> jax.Array:
         poses = link_poses(scene, world, q)
         counts = _counts(scene, world)
+        travel = None
+        if motion is not None:
+            travel = travel_from(scene, world, ways, poses, motion)
+
+        def swept(groups: tuple[int, ...], *sides: Sequence[Sequence[int]]) -> Score:
+            if travel is None or extent is None:
+                return score
+            nearer = [
+                travel.of(ways.of_geoms(scene, groups, side), extent.of(side))
+                for side in sides
+            ]
+            return score._replace(margin=score.margin + sum(nearer))
+
         least = []
         for front in fronts:
-            rated = scores(front, poses, world)
+            obstacles = [geom for o in front.obstacles for geom in o.ids]
+            facing = [(geom,) for geom in front.facing]
+            own = swept(front.groups, facing, [obstacles])
+            rated = scores(front, poses, world, own)
             rated = jnp.where(counts[np.array(front.groups)], rated, jnp.inf)
             least.append(jnp.min(rated, 0))
         if pairs.pairs:
-            least.append(convex(poses, world, counts))
+            sides = (
+                [(geom,) for geom in side] for side in zip(*pairs.pairs, strict=True)
+            )
+            own = swept(pairs.groups, *sides)
+            least.append(convex(poses, world, counts, own))
         return reduce(smaller, least)
 
-    return _in_blocks(block, q, world)
+    ways = find_ways(scene)
+    extent = None if motion is None else extents(scene, world, ways)
+    return _in_blocks(block, q, world, motion, extent)
 
 
 def _in_slots(world: World, rows: list[int]) -> Shapes:
@@ -136,7 +170,7 @@ def _least_over_slots(
     function: Callable, own: Shapes, world: World, rows: list[int], score: Score
 ) -> jax.Array:
     """Least score `[n, B]` over slots of one kind, each seen from its own frame."""
-    still = jnp.zeros((1, 1))
+    still = jnp.zeros((1, 1), own.centre[0].dtype)
     axes = [[still + (i == k) for i in range(3)] for k in range(3)]
     rated = []
     # Written out: in a loop, XLA on CPU takes three times as long.
@@ -202,14 +236,18 @@ def _counts(scene: Scene, world: World) -> jax.Array:
     return ~world.ignored & (jnp.stack(held) | ~needs[:, None])
 
 
-def _in_blocks(
-    function: Callable[[jax.Array, World], jax.Array], q: jax.Array, world: World
-) -> jax.Array:
-    """`function(q, world)` on blocks of the batch, one after the other on a CPU."""
-    rows = q.shape[-1]
+def _in_blocks(function: Callable[..., jax.Array], *batch: Any) -> jax.Array:
+    """`function(*batch)` on blocks of the batch, one after the other on a CPU.
+
+    Args:
+        function: Gives `[B]`.
+        batch: Trees of arrays `[..., N]`, or `[..., 1]` where the whole batch shares one.
+    """
+    leaves, tree = jax.tree.flatten(batch)
+    rows = max(leaf.shape[-1] for leaf in leaves)
     blocks = -(-rows // BLOCK)
     if blocks == 1 or jax.default_backend() != "cpu":
-        return function(q, world)
+        return function(*batch)
     width = -(-rows // blocks)
 
     def split(leaf: jax.Array) -> Any:  # None: the whole batch shares it
@@ -219,10 +257,8 @@ def _in_blocks(
         padded = jnp.pad(leaf, padding, mode="edge")
         return jnp.moveaxis(padded.reshape(*leaf.shape[:-1], blocks, width), -2, 0)
 
-    def one(parts: tuple[jax.Array, World]) -> jax.Array:
-        q, own = parts
-        pairs = zip(own, world, strict=True)
-        return function(q, World(*(b if a is None else a for a, b in pairs)))
+    def one(parts: list[Any]) -> jax.Array:
+        pairs = zip(parts, leaves, strict=True)
+        return function(*tree.unflatten(b if a is None else a for a, b in pairs))
 
-    parts = split(q), World(*map(split, world))
-    return jax.lax.map(one, parts).reshape(-1)[:rows]
+    return jax.lax.map(one, [*map(split, leaves)]).reshape(-1)[:rows]

@@ -69,7 +69,8 @@ def nearest_point(
         the origin or rounding leaves it open. With a reach, the square is above that of
         the reach only where a plane proves it.
     """
-    limit = jnp.zeros_like(start[0]) if reach is None else reach
+    square, zero = dot(start, start), jnp.zeros_like(start[0])
+    limit = zero if reach is None else reach
 
     def step(state: _State) -> _State:
         corners, nearest, squared = state.corners, state.nearest, state.squared
@@ -94,14 +95,15 @@ def nearest_point(
             jnp.where(apart, 1.0, state.apart),
             state.steps + 1,
             # A maximum of floats is vectorised, `any` is not.
-            jnp.max(jnp.where(open, 1.0, 0.0)),
+            jnp.max(open.astype(square.dtype)),
         )
 
     def unsettled(state: _State) -> jax.Array:
         return (state.open > 0) & (state.steps < MAX_STEPS)
 
-    square, zero = dot(start, start), jnp.zeros_like(start[0])
-    first = _State([start] * 3, start, square, zero, jnp.array(0), jnp.array(1.0))
+    first = _State(
+        [start] * 3, start, square, zero, jnp.array(0), jnp.ones((), square.dtype)
+    )
     last = jax.lax.while_loop(unsettled, step, first)
     # Searches that stall in flat tetrahedra have found a near point, and no proof.
     unproved = smaller(last.squared, limit * limit)

@@ -42,6 +42,7 @@ def config_free(
     q: jax.Array,
     margin: jax.typing.ArrayLike = 0.0,
     backend: Backend = "fast",
+    motion: jax.Array | None = None,
 ) -> jax.Array:
     """Whether clearance > margin; False where something is not finite.
 
@@ -51,12 +52,14 @@ def config_free(
         q: `[..., d]` joints [rad].
         margin: [m], at least 0.
         backend: Who answers.
+        motion: `[..., d]` [rad or m]. If given: whether that is proven, but for rounding in
+            float32, of every configuration whose joints are each within `motion` of q.
 
     Returns:
         `[...]` bool.
     """
-    exact = backend == "mjx"
-    return _flat(scene, world, q, Score(exact, jnp.asarray(margin)), backend) > 0
+    score = Score(backend == "mjx", jnp.asarray(margin, jnp.float32))
+    return _flat(scene, world, q, score, backend, motion) > 0
 
 
 def motion_free(
@@ -99,11 +102,20 @@ def points_for(length: float, resolution: float) -> int:
 
 
 def _flat(
-    scene: Scene, world: World, q: jax.Array, score: Score, backend: Backend
+    scene: Scene,
+    world: World,
+    q: jax.Array,
+    score: Score,
+    backend: Backend,
+    motion: jax.Array | None = None,
 ) -> jax.Array:
     """Flattens the batch, moves it to the last axis, and asks the backend."""
+    scene, world, q, motion = jax.tree.map(_single, (scene, world, q, motion))
     shape = batch_shape(world, q)
     finite = jnp.isfinite(q).all(-1)
+    if motion is not None:
+        shape = jnp.broadcast_shapes(shape, motion.shape[:-1])
+        finite &= jnp.isfinite(motion).all(-1)
     for pose in (world.object_pose, world.slot_pose):
         finite &= jnp.isfinite(pose).all((-2, -1))
         finite &= (pose[..., 3:] != 0).any(-1).all(-1)  # a rotation
@@ -112,11 +124,20 @@ def _flat(
     leaves = zip(world, OWN_AXES, strict=True)
     flat = World(*(_batch_last(leaf, shape, own) for leaf, own in leaves))
     rows = _batch_last(jnp.broadcast_to(q, (*shape, q.shape[-1])), shape, 1)
+    far = None if motion is None else _batch_last(motion, shape, 1)
     if backend == "fast":
-        scores = least_scores(scene, flat, rows, score)
+        scores = least_scores(scene, flat, rows, score, far)
     else:
         scores = least_distances(scene, flat, rows) - score.margin
+        if far is not None:
+            raise NotImplementedError
     return jnp.where(finite, scores.reshape(shape), jnp.nan)
+
+
+def _single(leaf: jax.typing.ArrayLike) -> jax.Array:
+    """In float32, whatever the caller computes in; flags stay flags."""
+    leaf = jnp.asarray(leaf)
+    return leaf if leaf.dtype == bool else leaf.astype(jnp.float32)
 
 
 def _batch_last(leaf: jax.Array, shape: tuple[int, ...], own: int) -> jax.Array:

@@ -4,7 +4,7 @@ Geoms of one kind are rows of one array, `[n, B]` for each coordinate. They are 
 the frames of their bodies, where they are constants, and carried to where they are.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from functools import partial, reduce
 from typing import NamedTuple, TypeVar
 
@@ -29,7 +29,8 @@ class Score(NamedTuple):
     """True: signed distance [m]. False: only the sign of distance - margin counts,
     which spares the square root and what happens inside a box."""
     margin: jax.Array | float = 0.0
-    """[m], at least 0; subtracted."""
+    """[m], at least 0; subtracted. One for all; or of each geom that faces obstacles
+    `[n, B]`, of each convex pair `[P, B]`."""
 
     def of_squared(self, squared: jax.Array, radius: jax.Array | float) -> jax.Array:
         """Rates a squared distance between cores that are `radius` thick together."""
@@ -52,7 +53,7 @@ class Shapes(NamedTuple):
     """The geoms' x, y and z in that frame."""
     size: Vector
     """MuJoCo's sizes, each `[n, B]` or `[n, 1]` [m]."""
-    vertices: Sequence[jax.Array] = ()
+    vertices: tuple[jax.Array, ...] = ()
     """Of meshes: their hulls in the geoms' own frames, each `[V, n, 1]` [m]."""
 
 
@@ -163,15 +164,15 @@ def once(values: Values) -> Values:
     return jax.lax.cond(always, lambda: values, zeros)
 
 
-def _vertices(model: mujoco.MjModel, ids: tuple[int, ...]) -> list[jax.Array]:
+def _vertices(model: mujoco.MjModel, ids: tuple[int, ...]) -> tuple[jax.Array, ...]:
     """Hulls of meshes, filled up to one length with their own first vertex."""
     meshes = [int(model.geom_dataid[g]) for g in ids]
     if model.geom_type[ids[0]] != mujoco.mjtGeom.mjGEOM_MESH:
-        return []
+        return ()
     hulls = [_hull(model, mesh) for mesh in meshes]
     longest = max(map(len, hulls))
     rows = [np.concatenate([h, h[:1].repeat(longest - len(h), 0)]) for h in hulls]
-    return list(jnp.asarray(np.transpose(rows)[..., None], jnp.float32))
+    return tuple(jnp.asarray(np.transpose(rows)[..., None], jnp.float32))
 
 
 def _hull(model: mujoco.MjModel, mesh: int) -> np.ndarray:

@@ -44,7 +44,7 @@ class Cores(NamedTuple):
     """Radius of a ball in the core, around the geom's centre [m]."""
     radius: jax.Array
     """Of what is around the core: that of spheres and capsules [m]."""
-    vertices: Sequence[jax.Array] = ()
+    vertices: tuple[jax.Array, ...] = ()
     """In the geoms' own frames, each `[V, n, 1]` [m]; none: no mesh among them."""
 
 
@@ -84,9 +84,10 @@ def stacked(parts: Sequence[Cores]) -> Cores:
     def filled(part: Cores) -> Cores:
         if not longest:
             return part
-        own = part.vertices or [jnp.zeros((1, len(part.disc), 1))] * 3
+        own = part.vertices or (jnp.zeros((1, len(part.disc), 1), jnp.float32),) * 3
         fill = [(0, longest - len(own[0])), (0, 0), (0, 0)]
-        return part._replace(vertices=[jnp.pad(x, fill, mode="edge") for x in own])
+        padded = (jnp.pad(x, fill, mode="edge") for x in own)
+        return part._replace(vertices=tuple(padded))
 
     def join(*leaves: jax.Array) -> jax.Array:
         last = max(leaf.shape[-1] for leaf in leaves)
