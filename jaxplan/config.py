@@ -128,8 +128,8 @@ class TrajectoryConfig:
     shortcut_candidates: int = 32
     spline_step: float = 0.1
     """Longest knot spacing of the spline [rad]."""
-    check_resolution: float = 0.02
-    """Gap of the dense validation [rad]."""
+    check_resolution: float = 0.01
+    """Longest gap between checked configurations where nothing proves what lies between [rad]."""
     check_rows: int = 1024
     """Configurations of one collision call."""
     velocity_scale: float = 0.6
