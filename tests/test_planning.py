@@ -507,7 +507,8 @@ def test_compiles_once():
         ({"p_uniform": 1.5}, "p_uniform 1.5"),
         ({"goal_tolerance": float("nan")}, "goal_tolerance nan"),
         ({"step_min": 0.3}, "0.3, 0.2"),
-        ({"metric": (1.0, 0.0)}, "7 positive"),
+        ({"metric": (1.0, 0.0)}, "more than 0"),
+        ({"metric": (1.0, 2.0)}, "7 weights"),
         ({"uniform_mode": "both"}, "'both'"),
     ],
 )

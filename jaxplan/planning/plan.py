@@ -8,7 +8,6 @@ compiled pieces, so a world may change from call to call; a batch that is short 
 padded and `active` says which lanes are real.
 """
 
-import math
 from collections.abc import Callable
 from typing import Any
 
@@ -21,6 +20,7 @@ from jaxplan.config import PlannerConfig
 from jaxplan.planning import lanes, search
 from jaxplan.planning.result import PlanResult, Status
 from jaxplan.planning.segment import Segment
+from jaxplan.planning.settings import check_settings
 from jaxplan.planning.state import Query
 
 Worlds = Any
@@ -54,7 +54,7 @@ def make_planner(
         ValueError: A setting or a limit that makes no sense, or arrays of the wrong shape.
     """
     q_min, q_max = np.asarray(q_min, np.float32), np.asarray(q_max, np.float32)
-    _check_settings(config, q_min, q_max)
+    check_settings(config, q_min, q_max)
     d = q_min.size
 
     def run(
@@ -137,51 +137,3 @@ def _batch(q, d: int, name: str) -> Any:
     if q.ndim != 2 or q.shape[1] != d:
         raise ValueError(f"{name} has shape {q.shape}, expected (problems, {d})")
     return q
-
-
-def _check_settings(
-    config: PlannerConfig, q_min: np.ndarray, q_max: np.ndarray
-) -> None:
-    """Refuses settings under which the search would be wrong without a word."""
-    if q_min.ndim != 1 or q_min.shape != q_max.shape or not np.all(q_min < q_max):
-        raise ValueError(
-            f"joint limits must be finite with q_min < q_max: {q_min} {q_max}"
-        )
-    if not (np.isfinite(q_min).all() and np.isfinite(q_max).all()):
-        raise ValueError(
-            f"joint limits must be finite with q_min < q_max: {q_min} {q_max}"
-        )
-    if config.method not in search.METHODS:
-        raise ValueError(f"method {config.method!r}, expected {sorted(search.METHODS)}")
-    if search.optimises(config):
-        if config.toggle_tie_break > 0 or config.metric is not None:
-            raise ValueError("ao_rrt_connect has no toggle_tie_break and no metric")
-        if config.uniform_mode != "toward":
-            raise ValueError("ao_rrt_connect needs uniform_mode 'toward'")
-    if config.uniform_mode not in ("toward", "independent"):
-        raise ValueError(f"uniform_mode {config.uniform_mode!r}: toward or independent")
-    if config.goal_tree not in ("mirrored", "uniform"):
-        raise ValueError(f"goal_tree {config.goal_tree!r}: mirrored or uniform")
-    for name in ("max_expansions", "workers", "lanes", "check_rows"):
-        if getattr(config, name) < 1:
-            raise ValueError(f"{name} {getattr(config, name)}, expected at least 1")
-    for name in ("p_uniform", "goal_bias"):
-        if not 0 <= getattr(config, name) <= 1:
-            raise ValueError(f"{name} {getattr(config, name)}, expected 0 to 1")
-    for name in (
-        "goal_tolerance",
-        "goal_connect",
-        "toggle_tie_break",
-        "path_resolution",
-    ):
-        if not 0 <= getattr(config, name) < math.inf:
-            raise ValueError(f"{name} {getattr(config, name)}, expected 0 or more")
-    if not 0 < config.step_min <= config.step_max < math.inf:
-        steps = f"{config.step_min}, {config.step_max}"
-        raise ValueError(f"step_min, step_max {steps}, expected 0 < min <= max")
-    if config.metric is not None and (
-        len(config.metric) != q_min.size or not min(config.metric) > 0
-    ):
-        raise ValueError(
-            f"metric {config.metric}, expected {q_min.size} positive weights"
-        )

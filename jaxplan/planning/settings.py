@@ -1,0 +1,53 @@
+"""Settings that make sense each, and together do not.
+
+Each one's own range is its type in `PlannerConfig`, checked when that is made.
+"""
+
+import numpy as np
+
+from jaxplan.config import PlannerConfig
+from jaxplan.planning.edges import points_for
+from jaxplan.planning.search import optimises
+
+MOST_POINTS = 2**20
+"""Checked configurations of a motion at most."""
+
+
+def check_settings(config: PlannerConfig, q_min: np.ndarray, q_max: np.ndarray) -> None:
+    """Refuses settings under which the search would be wrong without a word.
+
+    Args:
+        config: Of the search.
+        q_min: `[d]` lower joint limits [rad].
+        q_max: `[d]` upper joint limits [rad].
+
+    Raises:
+        ValueError: What does not fit together.
+    """
+    if not isinstance(config, PlannerConfig):
+        raise ValueError(f"config is a {type(config).__name__}, not a PlannerConfig")
+    finite = np.isfinite(q_min).all() and np.isfinite(q_max).all()
+    if (
+        not finite
+        or q_min.ndim != 1
+        or q_min.shape != q_max.shape
+        or not np.all(q_min < q_max)
+    ):
+        raise ValueError(
+            f"joint limits must be finite with q_min < q_max: {q_min} {q_max}"
+        )
+    if config.step_min > config.step_max:
+        steps = f"{config.step_min}, {config.step_max}"
+        raise ValueError(f"step_min, step_max {steps}, expected min <= max")
+    if points_for(config.step_max, config.edge_resolution) > MOST_POINTS:
+        raise ValueError(
+            f"edge_resolution {config.edge_resolution}, expected at least a 2^20th of "
+            f"step_max {config.step_max}"
+        )
+    if config.metric is not None and len(config.metric) != q_min.size:
+        raise ValueError(f"metric {config.metric}, expected {q_min.size} weights")
+    if optimises(config):
+        if config.toggle_tie_break > 0 or config.metric is not None:
+            raise ValueError("ao_rrt_connect has no toggle_tie_break and no metric")
+        if config.uniform_mode != "toward":
+            raise ValueError("ao_rrt_connect needs uniform_mode 'toward'")
