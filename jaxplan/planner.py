@@ -91,18 +91,14 @@ class Planner:
         check_settings(config, self.q_min, self.q_max)
         self._searches: dict[bool, Callable[..., PlanResult]] = {}
 
-    def __reduce__(self) -> tuple[Any, ...]:
-        """A copy is made from the same arguments: compiled programs stay behind."""
-        return type(self), (
-            self.scene,
-            self.config,
-            self._trajectory,
-            self._sampler,
-            self._velocity,
-            self._acceleration,
-            self.q_min,
-            self.q_max,
-        )
+    def __getstate__(self) -> dict[str, Any]:
+        """A copy is without compiled programs and what else is made at need."""
+        kept = {
+            name: value
+            for name, value in vars(self).items()
+            if not isinstance(getattr(type(self), name, None), cached_property)
+        }
+        return kept | {"_searches": {}}
 
     @cached_property
     def empty_world(self) -> World:

@@ -64,7 +64,8 @@ def joint_limits(
         _each(limit if value is None else value, len(joints), name)
         for value, limit, name in zip(given, own, ("q_min", "q_max"), strict=True)
     )
-    for joint in np.flatnonzero(~((low < high) & (low < np.inf) & (high > -np.inf))):
+    room = (low < high) & (low < np.inf) & (high > -np.inf)
+    for joint in np.flatnonzero(~room).tolist():
         raise ValueError(
             f"joint {joints[joint]!r} has limits {low[joint]} to {high[joint]}, "
             "expected q_min < q_max"
@@ -89,7 +90,7 @@ def waypoints(path: ArrayLike, d: int) -> np.ndarray:
     path = rows(path, 2, d, "path")
     if not len(path):
         raise ValueError("the path has no waypoints")
-    for row in np.flatnonzero(~np.isfinite(path).all(-1)):
+    for row in np.flatnonzero(~np.isfinite(path).all(-1)).tolist():
         raise ValueError(f"waypoint {row} of the path is not finite: {path[row]}")
     return path
 

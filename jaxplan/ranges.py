@@ -32,7 +32,10 @@ class Range(NamedTuple):
 MOST = float(np.finfo(np.float32).max)
 """What is more than this is infinite to the search."""
 
-Positive = Annotated[float, Range("more than 0", lambda x: np.float32(x) > 0)]
+LEAST = float(np.finfo(np.float32).tiny)
+"""What is less than this is 0 to it."""
+
+Positive = Annotated[float, Range("more than 0", lambda x: x >= LEAST)]
 NotNegative = Annotated[float, Range("0 or more", lambda x: x >= 0)]
 Step = Annotated[float, Range("at least 1e-6", lambda x: x >= 1e-6)]
 """A gap: there are as many as fit, so that it cannot be as small as one likes."""
@@ -111,7 +114,7 @@ def _fits(value: Any, kind: Any) -> bool:
         return (
             isinstance(value, Real)
             and not isinstance(value, bool)
-            and abs(value) <= MOST
+            and bool(abs(value) <= MOST)  # type: ignore[operator]
         )
     return isinstance(value, kind)
 

@@ -1,13 +1,14 @@
 """What changes between queries: where things are, what is held, what may touch."""
 
 from collections.abc import Iterable, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 import numpy.typing as npt
 
+from jaxplan.process import refuse_fork
 from jaxplan.scene import Scene
 
 SIZES = {"sphere": 1, "capsule": 2, "cylinder": 2, "ellipsoid": 3, "box": 3}
@@ -47,6 +48,10 @@ class World(NamedTuple):
     slot_size: jax.Array
     """`[..., n_slots, 3]` their sizes as MuJoCo's [m]."""
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """A copy is in NumPy: so it can be read without JAX."""
+        return World, tuple(map(np.asarray, self))
+
 
 OWN_AXES = (2, 1, 1, 1, 2, 2)
 """How many of each leaf's axes are not batch axes."""
@@ -74,6 +79,7 @@ def make_world(
         ValueError: There is no slot of that kind left, or no such contact group; a mocap
             body is held.
     """
+    refuse_fork()
     if object_pose is None:
         poses = [_reference_pose(scene, name) for name in scene.objects]
         object_pose = np.array(poses).reshape(-1, 7)

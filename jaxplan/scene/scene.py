@@ -13,13 +13,14 @@ import dataclasses
 from collections.abc import Iterable, Mapping, Sequence
 from functools import partial
 from os import PathLike
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
 import mujoco
 import numpy as np
 
+from jaxplan.process import refuse_fork
 from jaxplan.scene.chain import line
 from jaxplan.scene.contacts import geom_pairs
 from jaxplan.scene.names import known
@@ -53,6 +54,11 @@ class Scene:
     model: Numbers
     structure: Structure
 
+    def __getstate__(self) -> dict[str, Any]:
+        """A copy has its numbers in NumPy: so it can be read without JAX."""
+        numbers = Numbers(*map(np.asarray, self.model))  # type: ignore[arg-type]
+        return {"model": numbers, "structure": self.structure}
+
     @classmethod
     def from_mjcf(
         cls,
@@ -83,6 +89,7 @@ class Scene:
                 and several chains are longest; a geom that can touch the arm is a height
                 field, a flex or an SDF.
         """
+        refuse_fork()
         slots = slots or {}
         model = compile_model(source, slots)
         numbers = Numbers(*(jnp.asarray(getattr(model, f)) for f in Numbers._fields))
