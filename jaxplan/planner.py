@@ -234,7 +234,7 @@ class Planner:
             found = in_blocks(partial(self._clearance, world), q)
         else:
             leaves = zip(world, empty, strict=True)
-            each = World(*(leaf.reshape(-1, *own.shape) for leaf, own in leaves))
+            each = World(*(leaf.reshape(len(q), *own.shape) for leaf, own in leaves))
             found = in_blocks(self._clearance, each, q)
         return found.reshape(batch)
 
