@@ -17,7 +17,15 @@ import numpy as np
 import pytest
 
 import jaxplan
-from jaxplan import Plan, Planner, PlannerConfig, Scene, Status, TrajectoryConfig
+from jaxplan import (
+    Plan,
+    Planner,
+    PlannerConfig,
+    Scene,
+    Status,
+    TrajectoryConfig,
+    collision,
+)
 from jaxplan import make_world as world_for
 from jaxplan.blocks import SIZES
 from jaxplan.questions import seeds_of
@@ -188,6 +196,45 @@ def test_an_argument_that_is_none_is_named(planner, name, value, call):
         return  # plan_batch has seeds of its own
     with pytest.raises(ValueError, match=name) as error:
         call(planner, value)
+    one_line(error)
+
+
+Q = np.zeros(2)
+COLLISION = [
+    *refused("q ", {lambda s, w, v: collision.clearance(s, w, v): NOT_Q[:-1],
+                    lambda s, w, v: collision.config_free(s, w, v): NOT_Q[:-1],
+                    lambda s, w, v: collision.clearance_mujoco(s, w, v): NOT_Q[:-1],
+                    lambda s, w, v: collision.closest_pair(s, w, v): NOT_Q[:-1]}),
+    *refused("q0 ", {lambda s, w, v: collision.motion_free(s, w, v, Q, 3): NOT_Q[:-1]}),
+    *refused("q1 ", {lambda s, w, v: collision.motion_free(s, w, Q, v, 3): NOT_Q[:-1]}),
+    *refused("points ", {lambda s, w, v: collision.motion_free(s, w, Q, Q, v):
+                         (0, -1, 1.5, True, None, "3", np.nan)}),
+    *refused("world ", {lambda s, w, v: collision.clearance(s, v, Q): NOT_WORLDS,
+                        lambda s, w, v: collision.closest_pair(s, v, Q): NOT_WORLDS}),
+    *refused("world.", {lambda s, w, v: collision.clearance(s, w._replace(**v), Q): (
+        {"passive": np.zeros(3)}, {"object_pose": np.zeros((1, 7))}, {"held": None},
+        {"slot_pose": "abc"}, {"slot_size": np.zeros(3)}, {"ignored": np.zeros(99)})}),
+    *refused("scene ", {lambda s, w, v: collision.clearance(v, w, Q): (None, 3, "scene"),
+                        lambda s, w, v: collision.always_touching(v): (None, 3, "scene"),
+                        lambda s, w, v: collision.make_world(v): (None, 3, "scene")}),
+    *refused("margin", {lambda s, w, v: collision.config_free(s, w, Q, v): ("a", None, 1j)}),
+    *refused("backend ", {lambda s, w, v: collision.clearance(s, w, Q, v): ("slow", None, 3)}),
+    *refused("reach ", {lambda s, w, v: collision.closest_pair(s, w, Q, v): NOT_POSITIVE[1:]}),
+    *refused("samples ", {lambda s, w, v: collision.always_touching(s, v): (0, 1.5, True)}),
+    *refused("resolution ", {lambda s, w, v: collision.points_for(1.0, v): NOT_POSITIVE}),
+    *refused("length ", {lambda s, w, v: collision.points_for(v, 0.1): NOT_POSITIVE[1:]}),
+    *refused("source ", {lambda s, w, v: Scene.from_mjcf(v): (None, 3, [], b"<mujoco/>")}),
+    *refused("joints ", {lambda s, w, v: Scene.from_mjcf(ARM, v): ("turn", 3, [1], {})}),
+    *refused("hand ", {lambda s, w, v: Scene.from_mjcf(ARM, hand=v): (3, ["arm"], True)}),
+    *refused("slots", {lambda s, w, v: Scene.from_mjcf(ARM, slots=v): (
+        3, "box", ["box"], {"box": -1}, {"box": 1.5}, {"box": True}, {3: 1}, {"box": "2"})}),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("name", "value", "call"), COLLISION)
+def test_an_argument_of_scene_and_collision_is_named(scene, name, value, call):
+    with pytest.raises(ValueError, match=f"^{name}") as error:
+        call(scene, world_for(scene), value)
     one_line(error)
 
 

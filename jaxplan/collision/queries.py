@@ -6,10 +6,13 @@ from typing import Literal
 import jax
 import jax.numpy as jnp
 
+from jaxplan.collision.checks import checked
 from jaxplan.collision.engine import least_scores
 from jaxplan.collision.mjx_backend import least_distances
 from jaxplan.collision.narrow import Score
 from jaxplan.collision.world import OWN_AXES, World, batch_shape
+from jaxplan.process import refuse_fork
+from jaxplan.ranges import Count, NotNegative, Positive, check, numbers
 from jaxplan.scene import Scene
 
 Backend = Literal["fast", "mjx"]
@@ -33,6 +36,7 @@ def clearance(
         `[...]` [m], negative = penetration; NaN where q or the world is not finite, or a
         quaternion is zero.
     """
+    world, q = checked(scene, world, q=q)
     return _flat(scene, world, q, Score(exact=True), backend)
 
 
@@ -55,6 +59,9 @@ def config_free(
     Returns:
         `[...]` bool.
     """
+    world, q = checked(scene, world, q=q)
+    if not isinstance(margin, jax.Array):
+        margin = numbers("margin", margin)
     exact = backend == "mjx"
     return _flat(scene, world, q, Score(exact, jnp.asarray(margin)), backend) > 0
 
@@ -85,6 +92,8 @@ def motion_free(
     Returns:
         `[...]` bool.
     """
+    world, q0, q1 = checked(scene, world, q0=q0, q1=q1)
+    check("points", points, Count)
     share = (jnp.arange(points) + 1) / points
     q0, q1 = q0[..., None, :], q1[..., None, :]
     q = q0 + share[:, None] * (q1 - q0)
@@ -95,6 +104,8 @@ def motion_free(
 
 def points_for(length: float, resolution: float) -> int:
     """Configurations to check so that none of their gaps exceeds `resolution` [rad]."""
+    check("length", length, NotNegative)
+    check("resolution", resolution, Positive)
     return max(1, math.ceil(length / resolution - 1e-9))
 
 
@@ -102,6 +113,8 @@ def _flat(
     scene: Scene, world: World, q: jax.Array, score: Score, backend: Backend
 ) -> jax.Array:
     """Flattens the batch, moves it to the last axis, and asks the backend."""
+    refuse_fork()
+    check("backend", backend, Backend)
     shape = batch_shape(world, q)
     finite = jnp.isfinite(q).all(-1)
     for pose in (world.object_pose, world.slot_pose):

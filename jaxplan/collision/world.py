@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from jaxplan.process import refuse_fork
+from jaxplan.ranges import check
 from jaxplan.scene import Scene
 
 SIZES = {"sphere": 1, "capsule": 2, "cylinder": 2, "ellipsoid": 3, "box": 3}
@@ -80,6 +81,7 @@ def make_world(
             body is held.
     """
     refuse_fork()
+    check("scene", scene, Scene)
     if object_pose is None:
         poses = [_reference_pose(scene, name) for name in scene.objects]
         object_pose = np.array(poses).reshape(-1, 7)

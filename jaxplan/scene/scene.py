@@ -24,7 +24,7 @@ from jaxplan.process import refuse_fork
 from jaxplan.scene.chain import line
 from jaxplan.scene.contacts import geom_pairs
 from jaxplan.scene.names import known
-from jaxplan.scene.source import SLOTS, compile_model
+from jaxplan.scene.source import SLOTS, check_arguments, compile_model
 from jaxplan.scene.structure import Group, Slot, Structure, read_structure
 
 
@@ -90,6 +90,7 @@ class Scene:
                 field, a flex or an SDF.
         """
         refuse_fork()
+        check_arguments(source, joints, hand, slots)
         slots = slots or {}
         model = compile_model(source, slots)
         numbers = Numbers(*(jnp.asarray(getattr(model, f)) for f in Numbers._fields))
