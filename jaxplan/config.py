@@ -9,9 +9,21 @@ import typing
 from dataclasses import dataclass, fields, is_dataclass
 from typing import Any, Literal
 
+from jaxplan.ranges import (
+    Checked,
+    Count,
+    NotNegative,
+    Positive,
+    Probability,
+    Share,
+    Step,
+    StepOrOff,
+    Whole,
+)
+
 
 @dataclass(frozen=True)
-class PlannerConfig:
+class PlannerConfig(Checked):
     """RRT and RRT-Connect (Algorithm 1). Switches apply to every sampler alike.
 
     The defaults are for planning as such; `PAPER_PLANNER` has the paper's numbers.
@@ -19,9 +31,9 @@ class PlannerConfig:
 
     method: Literal["rrt", "rrt_connect", "ao_rrt_connect"] = "rrt_connect"
     """`ao_rrt_connect` uses all of `max_expansions` to find ever shorter paths."""
-    max_expansions: int = 20_000
+    max_expansions: Count = 20_000
     """N_rrt: proposals whose motion is checked, each connect step included."""
-    p_uniform: float = 0.2
+    p_uniform: Probability = 0.2
     """Probability that a proposal is a uniform segment and not a learned one, if there is a
     sampler."""
     tree_context: bool = True
@@ -34,39 +46,39 @@ class PlannerConfig:
     uniform_mode: Literal["toward", "independent"] = "toward"
     """`toward`: the uniform move goes from the nearest node toward q_rand (classical RRT).
     `independent`: its direction is drawn apart from q_rand, as the paper's UniformSegment."""
-    goal_bias: float = 0.05
+    goal_bias: Probability = 0.05
     """Probability that a uniform proposal goes straight toward q_goal."""
-    step_min: float = 1.0
-    step_max: float = 1.0
+    step_min: Positive = 1.0
+    step_max: Positive = 1.0
     """Step length of every sampler, s in `[step_min, step_max]` [rad]."""
-    goal_tolerance: float = 0.05
+    goal_tolerance: NotNegative = 0.05
     """A node reaches q_goal within this distance [rad]."""
-    goal_connect: float = 0.3
+    goal_connect: NotNegative = 0.3
     """An accepted node this near to q_goal [rad] tries the straight motion there; 0 = off."""
     goal_tree: Literal["mirrored", "uniform"] = "mirrored"
     """RRT-Connect's second tree: learned segments reversed, or uniform ones only."""
-    toggle_tie_break: float = 0.0
+    toggle_tie_break: NotNegative = 0.0
     """Nodes whose distances to the target differ by less than this [rad] count as tied, and the
     one nearer to q_toggle is the base of a learned proposal (section 4.3); 0 = off."""
     balance: bool = True
     """RRT-Connect's smaller tree grows until it has half of the other's nodes; off: in turn."""
-    dynamic_domain: float = 4.0
+    dynamic_domain: NotNegative = 4.0
     """Of a node whose motion was blocked: farther samples than this [rad] do not come to it, see
     `planning.domain`; 0 = off."""
-    metric: tuple[float, ...] | None = None
+    metric: tuple[Positive, ...] | None = None
     """Diagonal of W in d(q, q') = |W (q - q')|; None = identity."""
-    workers: int = 16
+    workers: Count = 16
     """K: expansions of a problem in one round, which do not know of each other. 1 is the textbook
     algorithm; more find a way sooner."""
-    lanes: int = 32
+    lanes: Count = 32
     """Problems of a batch that are searched side by side; the others wait for a free lane."""
-    check_rows: int = 256
+    check_rows: Count = 256
     """Configurations of one collision call, about. More pays on a GPU; the trees are the same."""
-    margin: float = 0.0
+    margin: NotNegative = 0.0
     """Clearance that a configuration needs to count as free [m]; 0 = C MuJoCo's own verdict."""
-    edge_resolution: float = 1 / 32
+    edge_resolution: Step = 1 / 32
     """Longest gap between checked configurations of a motion [rad]."""
-    path_resolution: float = 0.01
+    path_resolution: StepOrOff = 0.01
     """The same on the path that is found, checked once more as a whole; 0 = off."""
 
 
@@ -121,21 +133,21 @@ class DemonstrationConfig:
 
 
 @dataclass(frozen=True)
-class TrajectoryConfig:
+class TrajectoryConfig(Checked):
     """Shortcut, B-spline, time parameterisation and dense validation (section 4.3)."""
 
-    shortcut_rounds: int = 8
-    shortcut_candidates: int = 32
-    spline_step: float = 0.1
+    shortcut_rounds: Whole = 8
+    shortcut_candidates: Count = 32
+    spline_step: Step = 0.1
     """Longest knot spacing of the spline [rad]."""
-    check_resolution: float = 0.01
+    check_resolution: Step = 0.01
     """Longest gap between checked configurations where nothing proves what lies between [rad]."""
-    check_rows: int = 1024
+    check_rows: Count = 1024
     """Configurations of one collision call."""
-    velocity_scale: float = 0.6
-    acceleration_scale: float = 0.4
+    velocity_scale: Share = 0.6
+    acceleration_scale: Share = 0.4
     """Shares of the joint velocity and acceleration limits that are used."""
-    control_period: float = 0.01
+    control_period: Step = 0.01
     """Sampling period of the timed trajectory [s]."""
 
 

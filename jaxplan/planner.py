@@ -22,10 +22,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from jaxplan import collision, questions
+from jaxplan.blocks import in_blocks
 from jaxplan.collision import Certificate, World, make_world
 from jaxplan.config import PlannerConfig, TrajectoryConfig
 from jaxplan.plan import Plan, Timed
 from jaxplan.planning import PlanResult, Segment, Status, make_planner
+from jaxplan.planning.settings import check_settings
+from jaxplan.process import refuse_fork
+from jaxplan.ranges import Step, check
 from jaxplan.reason import no_path
 from jaxplan.scene import Scene
 from jaxplan.trajectory import Rung, make_trajectory
@@ -71,17 +75,30 @@ class Planner:
         q_min: ArrayLike | None = None,
         q_max: ArrayLike | None = None,
     ) -> None:
+        check("scene", scene, Scene)
+        check("config", config, PlannerConfig)
+        check("trajectory", trajectory, TrajectoryConfig)
+        check("sampler", sampler, Callable | None)
         self.scene, self.config = scene, config
         self._trajectory, self._sampler = trajectory, sampler
         self._d = d = len(scene.joints)
         self._velocity = questions.most(velocity, d, "velocity")
         self._acceleration = questions.most(acceleration, d, "acceleration")
         far = np.array([UNLIMITED[scene.joint_kind(name)] for name in scene.joints])
-        self.q_min, self.q_max = (
-            np.clip(np.asarray(own if given is None else given, float), -far, far)
-            for own, given in ((scene.q_min, q_min), (scene.q_max, q_max))
-        )
+        own = scene.q_min, scene.q_max
+        limits = questions.joint_limits((q_min, q_max), own, scene.joints)
+        self.q_min, self.q_max = (np.clip(limit, -far, far) for limit in limits)
+        check_settings(config, self.q_min, self.q_max)
         self._searches: dict[bool, Callable[..., PlanResult]] = {}
+
+    def __getstate__(self) -> dict[str, Any]:
+        """A copy is without compiled programs and what else is made at need."""
+        kept = {
+            name: value
+            for name, value in vars(self).items()
+            if not isinstance(getattr(type(self), name, None), cached_property)
+        }
+        return kept | {"_searches": {}}
 
     @cached_property
     def empty_world(self) -> World:
@@ -110,7 +127,8 @@ class Planner:
         """
         start = questions.rows(q_start, 1, self._d, "q_start")[None]
         goal = questions.rows(q_goal, 1, self._d, "q_goal")[None]
-        return self._plan(start, goal, [seed], world)[0]
+        seeds = questions.seeds_of([seed])
+        return self._plan(start, goal, seeds, world)[0]
 
     def plan_batch(
         self,
@@ -134,18 +152,13 @@ class Planner:
             questions.rows(q, 2, self._d, n)
             for q, n in ((q_starts, "q_starts"), (q_goals, "q_goals"))
         )
-        seeds = list(range(len(q_starts))) if seeds is None else list(seeds)
+        seeds = questions.seeds_of(range(len(q_starts)) if seeds is None else seeds)
         if not len(q_starts) == len(q_goals) == len(seeds):
             sizes = f"{len(q_starts)}, {len(q_goals)} and {len(seeds)}"
             raise ValueError(f"q_starts, q_goals and seeds have {sizes} rows")
         if worlds is None or isinstance(worlds, World):
             return self._plan(q_starts, q_goals, seeds, worlds)
-        rows = [questions.world_of(world, self.empty_world, ()) for world in worlds]
-        if len(rows) != len(seeds):
-            raise ValueError(f"{len(rows)} worlds for {len(seeds)} questions")
-        stacked = (
-            jax.tree.map(lambda *leaves: np.stack(leaves), *rows) if rows else None
-        )
+        stacked = questions.worlds_of(worlds, self.empty_world, len(seeds))
         return self._plan(q_starts, q_goals, seeds, stacked)
 
     def time(self, plan: Plan, speed: float = 1.0) -> Timed:
@@ -156,17 +169,21 @@ class Planner:
             speed: Factor on the velocity limits, its square on the accelerations.
 
         Raises:
-            ValueError: The plan has no path to its goal.
+            ValueError: The plan has no path to its goal, or one that is empty or not
+                finite; a speed that makes no sense.
         """
+        refuse_fork()
+        check("plan", plan, Plan)
         if not plan.solved:
             raise ValueError(f"no motion to time: {plan.reason}")
-        if not 0 < speed < np.inf:
-            raise ValueError(f"speed {speed}, expected more than 0")
+        path = questions.waypoints(plan.path, self._d)
+        world = questions.world_of(plan.world, self.empty_world, ())
+        speed = questions.number(speed, Step, "speed")
         timed = make_trajectory(
-            plan.path[None],
-            np.array([len(plan.path)]),
-            jax.random.key(plan.seed)[None],
-            lambda problem, q: self._free(plan.world, q),
+            path[None],
+            np.array([len(path)]),
+            _keys(np.array(questions.seeds_of([plan.seed]), np.uint32)),
+            lambda problem, q: self._free(world, q),
             speed * self._velocity,
             speed**2 * self._acceleration,
             self._trajectory,
@@ -208,13 +225,26 @@ class Planner:
 
         Args:
             qs: `[..., d]` [rad].
-            world: The model's own where None.
+            world: The model's own where None; its leading axes broadcast against those
+                of qs.
+
+        Raises:
+            ValueError: An argument of the wrong shape or type.
         """
-        q = np.asarray(qs, np.float32)
-        if q.ndim < 1 or q.shape[-1] != self._d:
-            raise ValueError(f"qs has shape {q.shape}, expected (..., {self._d})")
-        world = self.empty_world if world is None else world
-        return np.asarray(self._clearance(world, q))
+        refuse_fork()
+        q = questions.rows(qs, None, self._d, "qs")
+        empty = self.empty_world
+        world = empty if world is None else world
+        batch = questions.batch_of(world, empty, q.shape[:-1])
+        world = questions.world_of(world, empty, batch)
+        q = np.broadcast_to(q, (*batch, self._d)).reshape(-1, self._d)
+        if world.passive.ndim == empty.passive.ndim:  # one for all
+            found = in_blocks(partial(self._clearance, world), q)
+        else:
+            leaves = zip(world, empty, strict=True)
+            each = World(*(leaf.reshape(len(q), *own.shape) for leaf, own in leaves))
+            found = in_blocks(self._clearance, each, q)
+        return found.reshape(batch)
 
     @cached_property
     def _clearance(self) -> Callable:
@@ -235,7 +265,8 @@ class Planner:
         world: World | None,
     ) -> list[Plan]:
         """Plans for rows `[P, d]`; leaves of the world have a leading axis or none."""
-        count = len(questions.seeds_of(seeds))
+        refuse_fork()
+        count = len(seeds)
         empty = self.empty_world
         world = questions.world_of(empty if world is None else world, empty, (count,))
         own = bool(world.passive.ndim > empty.passive.ndim)

@@ -1,5 +1,8 @@
 """Why a question has no path, in a line."""
 
+from collections.abc import Callable
+from typing import NamedTuple
+
 import numpy as np
 
 from jaxplan import collision
@@ -7,6 +10,25 @@ from jaxplan.collision import World
 from jaxplan.plan import Plan
 from jaxplan.planning import Status
 from jaxplan.scene import Scene
+
+UNITS = {"hinge": "rad", "slide": "m"}
+"""Of a joint's position, by its kind."""
+
+
+class Asked(NamedTuple):
+    """A question and its answer."""
+
+    scene: Scene
+    plan: Plan
+    q_start: np.ndarray
+    q_goal: np.ndarray
+    limits: tuple[np.ndarray, np.ndarray]
+    margin: float
+
+    @property
+    def ends(self) -> dict[str, np.ndarray]:
+        """Start and goal, by name."""
+        return {"start": self.q_start, "goal": self.q_goal}
 
 
 def no_path(
@@ -22,38 +44,75 @@ def no_path(
     Args:
         scene: Of the question.
         plan: Its answer.
-        q_start: `[d]` [rad].
-        q_goal: `[d]` [rad].
-        limits: `(q_min [d], q_max [d])` of the search [rad].
+        q_start: `[d]` [rad or m].
+        q_goal: `[d]` [rad or m].
+        limits: `(q_min [d], q_max [d])` of the search [rad or m].
         margin: Clearance that counted as free [m].
 
     Returns:
         Empty if there is a path.
     """
-    q_min, q_max = limits
-    if plan.status == Status.BUDGET_EXHAUSTED:
-        gap = np.linalg.norm(plan.path[-1] - q_goal)
-        return (
-            f"no path after {plan.expansions} expansions; "
-            f"the nearest node is {gap:.3f} rad from the goal"
-        )
-    ends = (("start", q_start), ("goal", q_goal))
-    if plan.status in (Status.START_IN_COLLISION, Status.GOAL_IN_COLLISION):
-        name, q = ends[plan.status == Status.GOAL_IN_COLLISION]
-        return f"{name} in collision: {_contact(scene, plan.world, q, margin)}"
-    if plan.status == Status.OUT_OF_LIMITS:
-        over = [np.maximum(q_min - q, q - q_max) for _, q in ends]
-        name, q = ends[int(over[1].max() > over[0].max())]
-        j = int(np.argmax(np.maximum(*over)))
-        return (
-            f"{name} out of limits: joint {scene.joints[j]!r} at {q[j]:.4f}, "
-            f"limits {q_min[j]:.4f} to {q_max[j]:.4f}"
-        )
-    if plan.status == Status.INVALID_INPUT:
-        for name, q in ends:
-            for j in np.flatnonzero(~np.isfinite(q)):
-                return f"{name} is not finite: joint {scene.joints[j]!r} is {q[j]}"
+    asked = Asked(scene, plan, q_start, q_goal, limits, margin)
+    return REASONS[plan.status](asked) if plan.status in REASONS else ""
+
+
+def with_unit(scene: Scene, joint: str, position: float) -> str:
+    """A joint's position in words: "0.1000 m"."""
+    return f"{position:.4f} {UNITS[scene.joint_kind(joint)]}"
+
+
+def joint_distance(scene: Scene, distance: float) -> str:
+    """A distance between configurations in words: hinges and slides have no unit together."""
+    units = {UNITS[scene.joint_kind(joint)] for joint in scene.joints}
+    unit = units.pop() if len(units) == 1 else "(rad and m)"
+    return f"{distance:.3f} {unit}"
+
+
+def _exhausted(asked: Asked) -> str:
+    scene, plan = asked.scene, asked.plan
+    gap = float(np.linalg.norm(plan.path[-1] - asked.q_goal))
+    return (
+        f"no path after {plan.expansions} expansions; "
+        f"the nearest node is {joint_distance(scene, gap)} from the goal"
+    )
+
+
+def _in_collision(end: str) -> Callable[[Asked], str]:
+    def reason(asked: Asked) -> str:
+        q = asked.ends[end]
+        contact = _contact(asked.scene, asked.plan.world, q, asked.margin)
+        return f"{end} in collision: {contact}"
+
+    return reason
+
+
+def _out_of_limits(asked: Asked) -> str:
+    q_min, q_max = asked.limits
+    over = {n: np.maximum(q_min - q, q - q_max) for n, q in asked.ends.items()}
+    end = max(over, key=lambda name: over[name].max())
+    j = int(np.argmax(over[end]))
+    joint, scene = asked.scene.joints[j], asked.scene
+    at, low, high = (
+        with_unit(scene, joint, q[j]) for q in (asked.ends[end], q_min, q_max)
+    )
+    return f"{end} out of limits: joint {joint!r} at {at}, limits {low} to {high}"
+
+
+def _not_finite(asked: Asked) -> str:
+    for end, q in asked.ends.items():
+        for j in np.flatnonzero(~np.isfinite(q)).tolist():
+            return f"{end} is not finite: joint {asked.scene.joints[j]!r} is {q[j]}"
     return ""
+
+
+REASONS: dict[Status, Callable[[Asked], str]] = {
+    Status.BUDGET_EXHAUSTED: _exhausted,
+    Status.START_IN_COLLISION: _in_collision("start"),
+    Status.GOAL_IN_COLLISION: _in_collision("goal"),
+    Status.OUT_OF_LIMITS: _out_of_limits,
+    Status.INVALID_INPUT: _not_finite,
+}
+"""Who finds the words for a status; the others have a path, or nobody asked."""
 
 
 def _contact(scene: Scene, world: World, q: np.ndarray, margin: float) -> str:

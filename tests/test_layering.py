@@ -12,6 +12,7 @@ PACKAGE = Path(jaxplan.__file__).parent
 
 # Each part may import itself and what stands in an earlier line.
 LAYERS = (
+    {"blocks", "interrupt", "process", "ranges"},
     {"config", "provenance", "pretrained"},
     {"scene", "planning", "trajectory", "diffusion", "data"},
     {"collision", "networks"},

@@ -22,7 +22,14 @@ from planning_spheres import (
 
 from jaxplan.config import PAPER_PLANNER
 from jaxplan.planning import PlanResult, Segment, Status, lanes, make_planner, search
-from jaxplan.planning.edges import STAGES, all_free, motions_free, place, places, points_for
+from jaxplan.planning.edges import (
+    STAGES,
+    all_free,
+    motions_free,
+    place,
+    places,
+    points_for,
+)
 from jaxplan.planning.space import Space
 from jaxplan.planning.state import Query
 
@@ -56,7 +63,9 @@ def _grown(config, d):
         def free(problem, q):
             return config_free(worlds, problem, q)
 
-        return lanes.run(state, query, status, bank, free, None, rounds, go, space, config)
+        return lanes.run(
+            state, query, status, bank, free, None, rounds, go, space, config
+        )
 
     def begin(query):
         query, status = search.examine(query, space)
@@ -95,7 +104,7 @@ def test_stages_are_all_places_once_and_the_end_first(points):
         if (count := int(places(jnp.int32(s), many)))
     ]
     assert groups[0] == [points]
-    assert sorted(sum(groups, [])) == list(range(1, points + 1))
+    assert sorted(np.concatenate(groups)) == list(range(1, points + 1))
 
 
 @pytest.mark.parametrize("rows", [4, 64])
@@ -514,7 +523,8 @@ def test_compiles_once():
         ({"p_uniform": 1.5}, "p_uniform 1.5"),
         ({"goal_tolerance": float("nan")}, "goal_tolerance nan"),
         ({"step_min": 0.3}, "0.3, 0.2"),
-        ({"metric": (1.0, 0.0)}, "7 positive"),
+        ({"metric": (1.0, 0.0)}, "more than 0"),
+        ({"metric": (1.0, 2.0)}, "7 weights"),
         ({"uniform_mode": "both"}, "'both'"),
     ],
 )

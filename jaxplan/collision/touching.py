@@ -6,6 +6,7 @@ import numpy as np
 
 from jaxplan.collision.oracle import contacts_of
 from jaxplan.collision.world import make_world
+from jaxplan.ranges import Count, NotNegative, check
 from jaxplan.scene import Scene
 
 OFTEN = 0.9
@@ -28,6 +29,9 @@ def always_touching(
     Returns:
         (group, share of the poses in which its bodies touch), most frequent first.
     """
+    check("scene", scene, Scene)
+    check("samples", samples, Count)
+    check("tolerance", tolerance, NotNegative)
     world, q = make_world(scene), random_poses(scene, samples)
     table, touches = scene.group_table(), Counter()
     for distance, geoms in contacts_of(scene, world, q, tolerance):

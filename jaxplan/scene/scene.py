@@ -13,18 +13,20 @@ import dataclasses
 from collections.abc import Iterable, Mapping, Sequence
 from functools import partial
 from os import PathLike
+from typing import Any
 
 import jax
 import mujoco
 import numpy as np
 
+from jaxplan.process import refuse_fork
 from jaxplan.scene.chain import line
 from jaxplan.scene.contacts import geom_pairs
 from jaxplan.scene.excludes import ALWAYS, Exclude, Excluded
 from jaxplan.scene.limits import arm_limits, circular, rates
 from jaxplan.scene.names import geom_name, known, pair_of, shortened
 from jaxplan.scene.numbers import Numbers, read_numbers
-from jaxplan.scene.source import SLOTS, compile_model
+from jaxplan.scene.source import SLOTS, check_arguments, compile_model
 from jaxplan.scene.srdf import read_srdf
 from jaxplan.scene.structure import Group, Slot, Structure, read_structure
 from jaxplan.scene.urdf import read_urdf
@@ -41,6 +43,11 @@ class Scene:
 
     model: Numbers
     structure: Structure
+
+    def __getstate__(self) -> dict[str, Any]:
+        """A copy has its numbers in NumPy: so it can be read without JAX."""
+        numbers = Numbers(*map(np.asarray, self.model))  # type: ignore[arg-type]
+        return {"model": numbers, "structure": self.structure}
 
     @classmethod
     def from_mjcf(
@@ -80,6 +87,8 @@ class Scene:
                 field, a flex or an SDF; the arm's joints are tied by a loop or a tendon,
                 or leave no values to joints that follow them.
         """
+        refuse_fork()
+        check_arguments(source, joints, hand, slots)
         slots = slots or {}
         model = compile_model(source, slots)
         names = SLOTS if any(slots.values()) else None
