@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from jaxplan.collision import World
+from jaxplan.pose import Pose
 from jaxplan.ranges import check, numbers, shown
 
 
@@ -83,6 +84,19 @@ def rows(q: ArrayLike, axes: int | None, d: int, name: str) -> np.ndarray:
         raise ValueError(f"{name} has shape {shape}, expected {expected}")
     with np.errstate(over="ignore"):
         return array.astype(np.float32)
+
+
+def goals(q: Any, d: int) -> list[Any]:
+    """Goals of many questions, one by one: an array `[P, d]` or `[P, G, d]`, or a sequence."""
+    if isinstance(q, Sequence) and not isinstance(q, str):
+        return [
+            goal if isinstance(goal, Pose) else rows(goal, None, d, "q_goals")
+            for goal in q
+        ]
+    array = rows(q, None, d, "q_goals")
+    if array.ndim not in (2, 3):
+        raise ValueError(f"q_goals has shape {array.shape}, expected (problems, {d})")
+    return list(array)
 
 
 def waypoints(path: ArrayLike, d: int) -> np.ndarray:

@@ -7,12 +7,15 @@ import numpy as np
 
 from jaxplan import collision
 from jaxplan.collision import World
+from jaxplan.goals import Goals
 from jaxplan.plan import Plan
 from jaxplan.planning import Status
 from jaxplan.scene import Scene
 
 UNITS = {"hinge": "rad", "slide": "m"}
 """Of a joint's position, by its kind."""
+ENCLOSED = 100
+"""Expansions in which a tree should have grown."""
 
 
 class Asked(NamedTuple):
@@ -21,39 +24,29 @@ class Asked(NamedTuple):
     scene: Scene
     plan: Plan
     q_start: np.ndarray
-    q_goal: np.ndarray
+    """`[d]` [rad or m]."""
+    goals: Goals
     limits: tuple[np.ndarray, np.ndarray]
+    """`(q_min [d], q_max [d])` of the search [rad or m]."""
     margin: float
+    """Clearance that counted as free [m]."""
+    nodes: np.ndarray
+    """`[2]` of the start's tree and of the goal's."""
 
     @property
     def ends(self) -> dict[str, np.ndarray]:
         """Start and goal, by name."""
-        return {"start": self.q_start, "goal": self.q_goal}
+        return {"start": self.q_start, "goal": self.goals.q[0]}
 
 
-def no_path(
-    scene: Scene,
-    plan: Plan,
-    q_start: np.ndarray,
-    q_goal: np.ndarray,
-    limits: tuple[np.ndarray, np.ndarray],
-    margin: float,
-) -> str:
+def no_path(asked: Asked) -> str:
     """Names what is in the way: joint, pair of geoms, or how far the search came.
-
-    Args:
-        scene: Of the question.
-        plan: Its answer.
-        q_start: `[d]` [rad or m].
-        q_goal: `[d]` [rad or m].
-        limits: `(q_min [d], q_max [d])` of the search [rad or m].
-        margin: Clearance that counted as free [m].
 
     Returns:
         Empty if there is a path.
     """
-    asked = Asked(scene, plan, q_start, q_goal, limits, margin)
-    return REASONS[plan.status](asked) if plan.status in REASONS else ""
+    status = asked.plan.status
+    return REASONS[status](asked) if status in REASONS else ""
 
 
 def with_unit(scene: Scene, joint: str, position: float) -> str:
@@ -68,22 +61,48 @@ def joint_distance(scene: Scene, distance: float) -> str:
     return f"{distance:.3f} {unit}"
 
 
-def _exhausted(asked: Asked) -> str:
+def _searched(asked: Asked) -> str:
+    """Of a search that ended before it was there."""
     scene, plan = asked.scene, asked.plan
-    gap = float(np.linalg.norm(plan.path[-1] - asked.q_goal))
-    return (
-        f"no path after {plan.expansions} expansions; "
-        f"the nearest node is {joint_distance(scene, gap)} from the goal"
-    )
+    gap = asked.goals.q - plan.path[-1]
+    gap = np.where(scene.circular, (gap + np.pi) % (2 * np.pi) - np.pi, gap)
+    least = float(np.linalg.norm(gap, axis=1).min())
+    spent = f"{plan.expansions} expansions"
+    if plan.status == Status.TIME_OUT:
+        spent = f"{plan.time:.3f} s and {spent}"
+    near = f"the nearest node is {joint_distance(scene, least)} from the goal"
+    return f"no path after {spent}; {near}{_enclosed(asked)}"
 
 
-def _in_collision(end: str) -> Callable[[Asked], str]:
-    def reason(asked: Asked) -> str:
-        q = asked.ends[end]
-        contact = _contact(asked.scene, asked.plan.world, q, asked.margin)
-        return f"{end} in collision: {contact}"
+def _enclosed(asked: Asked) -> str:
+    """Says so where a tree could not grow."""
+    grown = asked.nodes - (1, len(asked.goals.q))
+    for end, nodes in zip(("start", "goal"), grown.tolist(), strict=True):
+        if nodes <= 0 < asked.plan.expansions - ENCLOSED:
+            return (
+                f"; the {end} seems enclosed: not one of the motions from it that were "
+                "tried is free"
+            )
+    return ""
 
-    return reason
+
+def _start_in_collision(asked: Asked) -> str:
+    contact = _contact(asked.scene, asked.plan.world, asked.q_start, asked.margin)
+    return f"start in collision: {contact}"
+
+
+def _goal_in_collision(asked: Asked) -> str:
+    goals = asked.goals
+    contact = _contact(asked.scene, asked.plan.world, goals.q[0], asked.margin)
+    if goals.status is None or goals.given == 1:
+        return f"goal in collision: {contact}"
+    few = len(goals.blocked)
+    outside = f", {goals.given - few} out of limits" if few < goals.given else ""
+    return f"{few} goals, all in collision{outside}; the nearest: {contact}"
+
+
+def _unreachable(asked: Asked) -> str:
+    return "no configuration within the limits was found that reaches the pose"
 
 
 def _out_of_limits(asked: Asked) -> str:
@@ -106,9 +125,11 @@ def _not_finite(asked: Asked) -> str:
 
 
 REASONS: dict[Status, Callable[[Asked], str]] = {
-    Status.BUDGET_EXHAUSTED: _exhausted,
-    Status.START_IN_COLLISION: _in_collision("start"),
-    Status.GOAL_IN_COLLISION: _in_collision("goal"),
+    Status.BUDGET_EXHAUSTED: _searched,
+    Status.TIME_OUT: _searched,
+    Status.START_IN_COLLISION: _start_in_collision,
+    Status.GOAL_IN_COLLISION: _goal_in_collision,
+    Status.GOAL_UNREACHABLE: _unreachable,
     Status.OUT_OF_LIMITS: _out_of_limits,
     Status.INVALID_INPUT: _not_finite,
 }

@@ -8,8 +8,8 @@ hardest; here every lane is busy until the queue is empty, in one compiled loop:
     round     every lane goes on with its problem (`search.advance`)
 
 A path whose dense check fails is not an answer: its problem starts anew in its lane, with
-other random numbers and what is left of its budget. So does, under a bound, a problem that
-is to have a shorter path (`bounded`).
+other random numbers, checks twice as fine, and what is left of its budget. So does, under
+a bound, a problem that is to have a shorter path (`bounded`).
 """
 
 from functools import partial
@@ -203,7 +203,8 @@ def _harvest(
     asked = asked._replace(bound=jnp.where(anew, bound, jnp.inf))
     state = search.start(state, begins, asked, known, space, config)
     # A new attempt goes on counting, and so draws other random numbers.
-    for name in ("chunk", "used", "expansions", "accepted", "checks"):
+    state = state._replace(attempt=state.attempt + (anew & ~sound))
+    for name in ("chunk", "used", "expansions", "accepted", "checks", "attempt"):
         count = jnp.where(loaded, 0, getattr(state, name))
         state = state._replace(**{name: count})
     return Lanes(

@@ -22,6 +22,8 @@ class Status(IntEnum):
     """A padding lane of the batch: nothing was asked."""
     TIME_OUT = 7
     """The time limit came first; the path leads to the best node reached."""
+    GOAL_UNREACHABLE = 8
+    """No configuration within the limits brings the body to the pose."""
 
 
 class PlanResult(NamedTuple):

@@ -41,6 +41,8 @@ from jaxplan.planning.tree import (
 )
 
 METHODS = {"rrt": rrt, "rrt_connect": rrt_connect, "ao_rrt_connect": rrt_connect}
+FINEST = 8
+"""Halvings of the resolution at most."""
 LIMIT_SLACK = 1e-4
 """How far a start or goal may lie outside the limits [rad]: rounding, no more."""
 MAX_WAYPOINTS = 512
@@ -89,6 +91,7 @@ def empty(query: Query, space: Space, config: PlannerConfig) -> State:
         expansions=zero,
         accepted=zero,
         checks=zero,
+        attempt=zero,
     )
 
 
@@ -192,7 +195,9 @@ def advance(
         moves &= bounded.admits(cost, q_new, reached, control, state.tree, query, space)
 
     asked = running & moves
-    free, checks = _check(config_free, q_base, q_new, asked, length, config)
+    free, checks = _check(
+        config_free, q_base, q_new, asked, length * _finer(state), config
+    )
     slot = state.tree.size[:, None] + jnp.cumsum(free, axis=1, dtype=jnp.int32) - 1
     tree = insert(state.tree, q_new, base, control.side, cost, slot, free)
     if config.dynamic_domain > 0:
@@ -223,6 +228,7 @@ def advance(
         expansions=state.expansions + jnp.sum(running, axis=1, dtype=jnp.int32),
         accepted=state.accepted + jnp.sum(free, axis=1, dtype=jnp.int32),
         checks=state.checks + checks,
+        attempt=state.attempt,
     )
 
 
@@ -249,6 +255,11 @@ def _base(
     ties = gaps <= least[..., None] + config.toggle_tie_break
     tied, _ = first_min(jnp.where(ties, to_toggle, jnp.inf))
     return jnp.where(move.learned, tied, anchor), least
+
+
+def _finer(state: State) -> jax.Array:
+    """`[P, 1]` factor on the number of checked configurations: what was refused was too coarse."""
+    return jnp.exp2(jnp.minimum(state.attempt, FINEST).astype(jnp.float32))[:, None]
 
 
 def _check(

@@ -95,6 +95,8 @@ class State(NamedTuple):
     expansions: jax.Array
     accepted: jax.Array
     checks: jax.Array
+    attempt: jax.Array
+    """`[P]` paths that were refused so far; motions are checked twice as finely after each."""
 
 
 def searching(state: State, config: PlannerConfig) -> jax.Array:
