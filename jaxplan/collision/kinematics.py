@@ -33,8 +33,10 @@ def link_poses(scene: Scene, world: World, q: jax.Array) -> jax.Array:
         world itself.
     """
     links = scene.structure.links
-    fixed = jnp.broadcast_to(jnp.eye(3, 4)[..., None], (3, 4, q.shape[-1]))
-    poses = jnp.zeros((1 + len(links), *fixed.shape)).at[0].set(fixed)
+    fixed = jnp.broadcast_to(
+        jnp.eye(3, 4, dtype=q.dtype)[..., None], (3, 4, q.shape[-1])
+    )
+    poses = jnp.zeros((1 + len(links), *fixed.shape), q.dtype).at[0].set(fixed)
     rows = range(1, len(links) + 1)
     for placed, run in groupby(rows, lambda row: links[row - 1].object >= 0):
         if not placed:
@@ -152,7 +154,7 @@ def _compose(a: jax.Array, b: jax.Array) -> jax.Array:
     """The frame b, given in a, in the world: `[3, 4, B]` each."""
     # Written out, because a batched matrix product is slow on CPU.
     product = sum(a[:, k, None] * b[None, k] for k in range(3))
-    last = jnp.array([0.0, 0.0, 0.0, 1.0])[:, None]
+    last = jnp.array([0.0, 0.0, 0.0, 1.0], a.dtype)[:, None]
     return product + a[:, 3, None] * last
 
 
@@ -166,13 +168,14 @@ def _attach(
     joint = np.array([link.joint for link in links])
     start = np.array([link.offset for link in links])
     slides = np.array([link.slides for link in links])[:, None]
-    turn = jnp.where(start[:, None, None], _matrices(model.body_quat[body]), jnp.eye(3))
+    still = jnp.eye(3, dtype=q.dtype)
+    turn = jnp.where(start[:, None, None], _matrices(model.body_quat[body]), still)
     axis, anchor = model.jnt_axis[joint][..., None], model.jnt_pos[joint][..., None]
     middle = jnp.where(start[:, None], model.body_pos[body], 0)[..., None]
     value = _values(scene, world, q, links)
     angle, shift = jnp.where(slides, 0, value), jnp.where(slides, value, 0)
     # Rodrigues: R = turn (1 + sin K + (1 - cos) K^2), about the anchor.
-    cross = jnp.cross(axis, jnp.eye(3), axisa=1, axisc=1)
+    cross = jnp.cross(axis, still, axisa=1, axisc=1)
     constants = turn, turn @ cross, turn @ cross @ cross, anchor
     steps = (
         jnp.array(rows),
