@@ -464,6 +464,18 @@ def test_an_arm_on_a_floating_base():
     np.testing.assert_allclose(frames[:, :, 3], [pose.position] * 2, atol=1e-4)
 
 
+def test_the_caller_may_compute_in_double_precision(world):
+    with jax.enable_x64(True):
+        scene = Scene.from_mjcf(ARM, joints=JOINTS, hand="hand")
+        pose = pose_at(placed(scene, Q, [0.05]), "hand")
+        found = inverse_kinematics(scene, make_world(scene, passive=[0.05]), pose)
+        frames = jax.jit(frame_pose, static_argnums=3)(scene, world, found.q, "hand")
+        assert len(found.q) > 4
+        for q, frame in zip(found.q, np.asarray(frames), strict=True):
+            assert_reaches(scene, q, pose, [0.05])
+            np.testing.assert_allclose(frame[:, 3], pose.position, atol=1e-3)
+
+
 def test_a_batch_of_none(scene, world):
     q, reached = inverse_kinematics_batch(scene, world, [])
     assert q.shape == (0, 8)
