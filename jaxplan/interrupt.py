@@ -14,14 +14,17 @@ from itertools import pairwise
 
 INTERRUPTED = 130
 """Exit code, as of a shell's command that was ended by SIGINT."""
+MODULES = "jaxplan", "jaxplan.train"
+"""That are commands."""
 CLOSED = 141
 """Of one whose reader went away, as by SIGPIPE."""
 
 
 def is_command() -> bool:
-    """Whether this process was started as `jaxplan` or `python -m jaxplan`."""
+    """Whether this process was started as `jaxplan`, or by `python -m` one of `MODULES`."""
     script = os.path.basename(sys.argv[0]) if sys.argv else ""
-    return script == "jaxplan" or ("-m", "jaxplan") in pairwise(sys.orig_argv)
+    modules = {("-m", module) for module in MODULES}
+    return script == "jaxplan" or not modules.isdisjoint(pairwise(sys.orig_argv))
 
 
 def end_on_interrupt() -> None:

@@ -35,6 +35,7 @@ MOST = float(np.finfo(np.float32).max)
 LEAST = float(np.finfo(np.float32).tiny)
 """What is less than this is 0 to it."""
 
+Number = Annotated[float, Range("finite", lambda x: True)]
 Positive = Annotated[float, Range("more than 0", lambda x: x >= LEAST)]
 NotNegative = Annotated[float, Range("0 or more", lambda x: x >= 0)]
 Step = Annotated[float, Range("at least 1e-6", lambda x: x >= 1e-6)]

@@ -7,6 +7,7 @@ import pickle
 import signal
 import subprocess
 import sys
+import types
 import typing
 from pathlib import Path
 from typing import Annotated, Literal
@@ -25,6 +26,7 @@ from jaxplan import (
     Status,
     TrajectoryConfig,
     collision,
+    config,
 )
 from jaxplan import make_world as world_for
 from jaxplan.blocks import SIZES
@@ -49,15 +51,26 @@ ARM = """
 </mujoco>
 """
 LEFT, RIGHT, HIT = [-0.5, 0.0], [0.5, 0.0], [0.0, 0.0]
+ABSTRACT = config.TrainConfig, config.SegmentTraining
 SMALL = PlannerConfig(max_expansions=500)
-CONFIGS = PlannerConfig(), TrajectoryConfig()
-FIELDS = [(c, f.name) for c in CONFIGS for f in dataclasses.fields(c)]
+CONFIGS = [
+    kind()
+    for kind in vars(config).values()
+    if isinstance(kind, type)
+    and dataclasses.is_dataclass(kind)
+    and kind not in ABSTRACT
+]
+FIELDS = [
+    pytest.param(c, f.name, id=f"{type(c).__name__}.{f.name}")
+    for c in CONFIGS
+    for f in dataclasses.fields(c)
+]
 NOTHING = ("a", None, (), {}, object(), 1j, np.ones(2), b"1")
 """No setting that is a number, a word or a switch is one of these."""
 RANGES = {"more than 0": (0, -1), "0 or more": (-1e-9, -1), "at least 1e-6": (0, -1),
           "at least 1e-6, or 0": (1e-9, -1), "0 to 1": (-0.1, 1.1),
           "more than 0, at most 1": (0, 1.1), "1 to 2^31 - 1": (0, 2**31),
-          "0 to 2^31 - 1": (-1, 2**31)}  # fmt: skip
+          "0 to 2^31 - 1": (-1, 2**31), "finite": ()}  # fmt: skip
 """Numbers just outside each range."""
 
 
@@ -89,44 +102,45 @@ def one_line(error: pytest.ExceptionInfo, *words: str) -> None:
 # Settings
 
 
-@pytest.mark.parametrize(("config", "name"), FIELDS)
-def test_every_setting_is_checked_by_name_type_and_range(config, name):
-    kind = kinds(type(config))[name]
-    (part,) = leaves_of(kind)
-    bad = list(NOTHING)
-    if typing.get_origin(part) is Literal:
-        bad += [1, True, "prm", typing.get_args(part)[0].upper()]
-    elif part is bool:
-        bad += [0, 1, 1.0, "True"]
-    else:
-        assert typing.get_origin(part) is Annotated, f"{name} has no range"
-        number, allowed = typing.get_args(part)
-        bad += [np.nan, np.inf, -np.inf, True, np.bool_(1), 10**400, "1"]
-        bad += [1.5] if number is int else [1e39]
-        bad += RANGES[allowed.words]
-    if part is not kind:  # in a tuple, or none
-        bad = [[1.0, 2.0], "ab", 1.0, *((1.0, value) for value in bad)]
+@pytest.mark.parametrize(("settings", "name"), FIELDS)
+def test_every_setting_is_checked_by_name_type_and_range(settings, name):
+    bad = bad_for(kinds(type(settings))[name], name)
     for value in bad:
         with pytest.raises(ValueError, match=f"^{name} ") as error:
-            dataclasses.replace(config, **{name: value})
+            dataclasses.replace(settings, **{name: value})
         one_line(error, "expected")
 
 
-def leaves_of(kind):
-    """The kinds of the numbers in a tuple, or in a union."""
-    if kind is type(None) or kind is Ellipsis:
-        return []
-    if typing.get_origin(kind) in (None, Annotated, Literal):
-        return [kind]
-    return [leaf for part in typing.get_args(kind) for leaf in leaves_of(part)]
+def bad_for(kind, name: str) -> list:
+    """What no setting of a kind may be; fails where the kind says no range."""
+    origin, inner = typing.get_origin(kind), typing.get_args(kind)
+    if origin in (typing.Union, types.UnionType):
+        one = next(part for part in inner if part is not type(None))
+        return [value for value in bad_for(one, name) if value is not None]
+    if origin is tuple:
+        count = 2 if inner[-1] is Ellipsis else len(inner)
+        each = [(value,) * count for value in bad_for(inner[0], name)]
+        return [[1.0, 2.0], "ab", 1.0, *each]
+    if origin is Literal:
+        return [*NOTHING, 1, True, "prm", inner[0].upper()]
+    if kind is bool:
+        return [*NOTHING, 0, 1, 1.0, "True"]
+    if kind is str:
+        return [value for value in NOTHING if not isinstance(value, str)]
+    if dataclasses.is_dataclass(kind):
+        return [*NOTHING, 1.0, PlannerConfig(), kind]
+    assert origin is Annotated, f"{name} has no range"
+    number, allowed = inner
+    bad = [*NOTHING, np.nan, np.inf, -np.inf, True, np.bool_(1), 10**400, "1"]
+    return [*bad, 1.5 if number is int else 1e39, *RANGES[allowed.words]]
 
 
-@pytest.mark.parametrize(("config", "name"), FIELDS)
-def test_numbers_of_numpy_are_numbers(config, name):
-    value = getattr(config, name)
+@pytest.mark.parametrize(("settings", "name"), FIELDS)
+def test_numbers_of_numpy_are_numbers(settings, name):
+    value = getattr(settings, name)
     if isinstance(value, int | float):
-        same = dataclasses.replace(config, **{name: np.asarray(value)[()]})
-        assert same == config
+        same = dataclasses.replace(settings, **{name: np.asarray(value)[()]})
+        assert same == settings
 
 
 @pytest.mark.parametrize(
@@ -534,12 +548,12 @@ run_script(main, Check)
 def test_the_command_hears_ctrl_c_while_it_is_imported():
     code = """
     import signal, sys
-    for argv in ("python", "-m", "jaxplan", "check"), ("python", "-m", "pytest"):
-        sys.orig_argv[:] = argv
+    for argv in ("-m", "jaxplan", "check"), ("-m", "jaxplan.train"), ("-m", "pytest"):
+        sys.orig_argv[:] = "python", *argv
         from jaxplan import interrupt
         print(interrupt.is_command())
     print(signal.getsignal(signal.SIGINT) is signal.default_int_handler)
     """.replace("\n    ", "\n")
-    assert run(code) == (0, "True\nFalse\nFalse\n", "")
+    assert run(code) == (0, "True\nTrue\nFalse\nFalse\n", "")
     library = "import jaxplan, signal; print(signal.getsignal(signal.SIGINT))"
     assert "default_int_handler" in run(library)[1]
