@@ -4,11 +4,13 @@ As in `reach`, but rho is the greatest that it can be: from a joint's axis acros
 joint's anchor, then all the way along the arm, slides at their ends.
 """
 
+from functools import partial
+
 import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxplan.collision.engine import counting
+from jaxplan.collision.engine import XLA_OPTIONS, counting
 from jaxplan.collision.kinematics import link_poses
 from jaxplan.collision.reach import (
     Extent,
@@ -69,21 +71,36 @@ def pair_reaches(scene: Scene, world: World) -> np.ndarray:
     Returns:
         `[ngeom, ngeom, d]` [m per rad or m], symmetric; 0 of pairs that are not checked.
     """
-    model, ways = scene.mj_model, find_ways(scene)
-    table = np.zeros((model.ngeom, model.ngeom, len(scene.joints)))
-    travel, extent = _anywhere(scene, world, ways, None)
-    for index, group in enumerate(scene.groups):
-        pairs = [pair for contact in group.contacts for pair in geom_pairs(contact)]
-        for geoms in zip(*pairs, strict=True):
-            side = [(geom,) for geom in geoms]
-            own = ways.of_geoms(scene, len(side) * [index], side)
-            if not any(own):
-                continue
-            reach = np.asarray(moved_by(travel, own, _each(extent.of(side))))
-            i, j = np.array(pairs).T
-            table[i, j] += reach[..., 0]
-            table[j, i] += reach[..., 0]
+    table = np.zeros(2 * (scene.mj_model.ngeom,) + (len(scene.joints),))
+    pairs = np.array([pair for _, pair in _pairs(scene)], int).reshape(-1, 2)
+    table[*pairs.T] = table[*pairs.T[::-1]] = np.asarray(_reaches(scene, world))
     return table
+
+
+@partial(jax.jit, compiler_options=XLA_OPTIONS)
+def _reaches(scene: Scene, world: World) -> jax.Array:
+    """`[n_pairs, d]`, as `_pairs` orders them."""
+    ways, pairs = find_ways(scene), _pairs(scene)
+    travel, extent = _anywhere(scene, world, ways, None)
+    reach = jnp.zeros((len(pairs), len(scene.joints), 1))
+    if not pairs:
+        return reach[..., 0]
+    groups, geoms = zip(*pairs, strict=True)
+    for side in zip(*geoms, strict=True):
+        own = [(geom,) for geom in side]
+        sides = ways.of_geoms(scene, groups, own)
+        reach += moved_by(travel, sides, _each(extent.of(own)))
+    return reach[..., 0]
+
+
+def _pairs(scene: Scene) -> list[tuple[int, tuple[int, int]]]:
+    """Contact group and geoms of all pairs."""
+    return [
+        (index, pair)
+        for index, group in enumerate(scene.groups)
+        for contact in group.contacts
+        for pair in geom_pairs(contact)
+    ]
 
 
 def _each(extent: Extent) -> Extent:
