@@ -16,7 +16,13 @@ import numpy as np
 from jaxplan.collision.convex import least_convex
 from jaxplan.collision.kinematics import link_poses, rotation_of
 from jaxplan.collision.narrow import CLOSED
-from jaxplan.collision.reach import Extent, extents, find_ways, travel_from
+from jaxplan.collision.reach import (
+    Extent,
+    extents,
+    find_ways,
+    moved_by,
+    travel_from,
+)
 from jaxplan.collision.shapes import (
     Score,
     Shapes,
@@ -120,7 +126,7 @@ def least_scores(
         q: jax.Array, world: World, motion: jax.Array | None, extent: Extent | None
     ) -> jax.Array:
         poses = link_poses(scene, world, q)
-        counts = _counts(scene, world)
+        counts = counting(scene, world)
         travel = None
         if motion is not None:
             travel = travel_from(scene, world, ways, poses, motion)
@@ -129,7 +135,7 @@ def least_scores(
             if travel is None or extent is None:
                 return score
             nearer = [
-                travel.of(ways.of_geoms(scene, groups, side), extent.of(side))
+                moved_by(travel, ways.of_geoms(scene, groups, side), extent.of(side))
                 for side in sides
             ]
             return score._replace(margin=score.margin + sum(nearer))
@@ -150,8 +156,11 @@ def least_scores(
             least.append(convex(poses, world, counts, own))
         return reduce(smaller, least)
 
-    ways = find_ways(scene)
-    extent = None if motion is None else extents(scene, world, ways)
+    ways, extent = find_ways(scene), None
+    if motion is not None:
+        width = max(leaf.shape[-1] for leaf in world)
+        anywhere = jnp.zeros((len(q), width), q.dtype)
+        extent = extents(scene, ways, link_poses(scene, world, anywhere))
     return _in_blocks(block, q, world, motion, extent)
 
 
@@ -229,7 +238,7 @@ def _convex_pairs(scene: Scene) -> ConvexPairs:
     )
 
 
-def _counts(scene: Scene, world: World) -> jax.Array:
+def counting(scene: Scene, world: World) -> jax.Array:
     """`[n_groups, B]` whether each contact group counts."""
     needs = np.array([bool(group.held) for group in scene.groups])
     held = [jnp.any(world.held[np.array(group.held, int)], 0) for group in scene.groups]

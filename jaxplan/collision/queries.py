@@ -5,7 +5,10 @@ from typing import Literal
 
 import jax
 import jax.numpy as jnp
+import numpy as np
+import numpy.typing as npt
 
+from jaxplan.collision.bounds import group_bounds, pair_reaches
 from jaxplan.collision.engine import least_scores
 from jaxplan.collision.mjx_backend import least_distances
 from jaxplan.collision.narrow import Score
@@ -107,6 +110,61 @@ def points_for(length: float, resolution: float) -> int:
     return max(1, math.ceil(length / resolution - 1e-9))
 
 
+def motion_bound(
+    scene: Scene,
+    world: World,
+    dq: jax.Array,
+    q_min: jax.Array | None = None,
+    q_max: jax.Array | None = None,
+) -> jax.Array:
+    """How far a straight joint motion moves any two geoms that count, one against the other.
+
+    Never too small, wherever within the limits the motion begins.
+
+    Args:
+        scene: The scene.
+        world: Its leading axes broadcast against those of dq.
+        dq: `[..., d]` from the start of the motion to its end [rad or m].
+        q_min: `[d]` lower limits [rad or m]; the scene's where None.
+        q_max: `[d]` upper limits.
+
+    Returns:
+        `[...]` [m]; infinite where a hinge turns that has a slide without limits above it on
+        the way to a geom, NaN where something is not finite.
+    """
+    limits = q_min, q_max
+    own = scene.q_min, scene.q_max
+    bounds = [
+        x if given is None else given for x, given in zip(own, limits, strict=True)
+    ]
+    scene, world, dq, low, high = jax.tree.map(_single, (scene, world, dq, *bounds))
+    shape, finite, flat, (rows,) = _flatten(world, dq)
+    if not scene.groups:
+        return jnp.where(finite, 0.0, jnp.nan)
+    bound = jnp.max(group_bounds(scene, flat, rows, (low, high)), 0)
+    return jnp.where(
+        finite, jnp.broadcast_to(bound, rows.shape[-1:]).reshape(shape), jnp.nan
+    )
+
+
+def pair_motion_bounds(scene: Scene, world: World, dq: npt.ArrayLike) -> np.ndarray:
+    """How far joint motions move the geoms of each pair, one against the other.
+
+    Args:
+        scene: The scene.
+        world: One world, without batch axes.
+        dq: `[..., d]` how far each joint moves [rad or m].
+
+    Returns:
+        `[..., ngeom, ngeom]` [m], symmetric, by geom id: at most this, wherever within the
+        scene's limits the arm is; 0 of pairs that are not checked.
+    """
+    scene, world = jax.tree.map(_single, (scene, world))
+    table = pair_reaches(scene, World(*(leaf[..., None] for leaf in world)))
+    moved = np.abs(np.asarray(dq, float))[..., None, None, :]
+    return np.where(moved == 0, 0, moved * table).sum(-1)
+
+
 def _flat(
     scene: Scene,
     world: World,
@@ -115,13 +173,27 @@ def _flat(
     backend: Backend,
     motion: jax.Array | None = None,
 ) -> jax.Array:
-    """Flattens the batch, moves it to the last axis, and asks the backend."""
+    """Asks the backend about the flattened batch."""
     scene, world, q, motion = jax.tree.map(_single, (scene, world, q, motion))
-    shape = batch_shape(world, q)
-    finite = jnp.isfinite(q).all(-1)
-    if motion is not None:
-        shape = jnp.broadcast_shapes(shape, motion.shape[:-1])
-        finite &= jnp.isfinite(motion).all(-1)
+    given = [q] if motion is None else [q, motion]
+    shape, finite, flat, rows = _flatten(world, *given)
+    if backend == "fast":
+        scores = least_scores(scene, flat, rows[0], score, *rows[1:])
+    else:
+        scores = least_distances(scene, flat, rows[0]) - score.margin
+        if motion is not None and scene.groups:
+            scores -= jnp.max(group_bounds(scene, flat, rows[1]), 0)
+    return jnp.where(finite, scores.reshape(shape), jnp.nan)
+
+
+def _flatten(
+    world: World, *given: jax.Array
+) -> tuple[tuple[int, ...], jax.Array, World, list[jax.Array]]:
+    """The batch's shape, where all is finite, and world and vectors with the batch last."""
+    shape = jnp.broadcast_shapes(*(batch_shape(world, x) for x in given))
+    finite = jnp.ones((), bool)
+    for vectors in given:
+        finite &= jnp.isfinite(vectors).all(-1)
     for pose in (world.object_pose, world.slot_pose):
         finite &= jnp.isfinite(pose).all((-2, -1))
         finite &= (pose[..., 3:] != 0).any(-1).all(-1)  # a rotation
@@ -129,15 +201,10 @@ def _flat(
     finite &= jnp.isfinite(world.slot_size).all((-2, -1))
     leaves = zip(world, OWN_AXES, strict=True)
     flat = World(*(_batch_last(leaf, shape, own) for leaf, own in leaves))
-    rows = _batch_last(jnp.broadcast_to(q, (*shape, q.shape[-1])), shape, 1)
-    far = None if motion is None else _batch_last(motion, shape, 1)
-    if backend == "fast":
-        scores = least_scores(scene, flat, rows, score, far)
-    else:
-        scores = least_distances(scene, flat, rows) - score.margin
-        if far is not None:
-            raise NotImplementedError
-    return jnp.where(finite, scores.reshape(shape), jnp.nan)
+    rows = [
+        _batch_last(jnp.broadcast_to(x, (*shape, x.shape[-1])), shape, 1) for x in given
+    ]
+    return shape, finite, flat, rows
 
 
 def _single(leaf: jax.typing.ArrayLike) -> jax.Array:

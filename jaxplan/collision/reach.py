@@ -1,4 +1,4 @@
-"""How far geoms move while every joint stays near its place: bounds, never too small.
+"""How far geoms move at most while every joint stays near its place.
 
 A hinge that turns by t moves a point by at most t times its distance from the axis, a
 slide by what it slides. Of a contact's two geoms only the joints between them count, those
@@ -6,9 +6,9 @@ that move one and not the other. Taken from a geom upwards, each of these joints
 
     D <- D + t (rho + D)    for a hinge,    D <- D + t    for a slide
 
-where rho is how far it is from the joint's axis to a point that moves with the geom: the
-anchor of the first of these joints. What the geom itself has beyond that point, the first
-joint turns about its own axis, and the others by their angles together.
+where rho is the distance from the joint's axis to a point that moves with the geom: the
+anchor of the first of these joints. As to what the geom has beyond that point, the first
+joint turns it about its own axis, and the others by all their angles together.
 """
 
 from collections.abc import Sequence
@@ -19,7 +19,6 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxplan.collision.kinematics import link_poses
 from jaxplan.collision.shapes import (
     Shapes,
     Vector,
@@ -40,28 +39,43 @@ class Way(NamedTuple):
     links: tuple[int, ...]
     """Rows of the links that they move, from the geom up."""
     held: tuple[tuple[int, bool], ...]
-    """So it is where these objects are held or are not."""
+    """So it is where these objects are held, or are not."""
 
 
 class Ways(NamedTuple):
-    """Those of all contact groups of a scene."""
+    """Those of all contacts of a scene."""
 
     ways: tuple[Way, ...]
     """The first has no joints."""
     of_side: dict[tuple[int, int], tuple[int, ...]]
-    """By group and body: which of the ways may be that of the body's geoms."""
+    """By contact group and body: which of the ways may be that of the body's geoms."""
 
     def of_geoms(
         self, scene: Scene, groups: Sequence[int], side: Sequence[Sequence[int]]
     ) -> list[tuple[int, ...]]:
-        """Those of each geom, or of each of some geoms of one body, by contact group."""
+        """By contact group `[n]`, those of some geoms of one body, `[n]` or `[1]`."""
         sides = side if len(side) == len(groups) else len(groups) * [*side]
         bodies = [int(scene.mj_model.geom_bodyid[geoms[0]]) for geoms in sides]
         return [self.of_side[key] for key in zip(groups, bodies, strict=True)]
 
+    def order(self) -> np.ndarray:
+        """`[n_ways, longest]` their links, filled up with 0: the world, which stands still."""
+        longest = max(len(way.links) for way in self.ways)
+        rows = [(*way.links, *(longest - len(way.links)) * (0,)) for way in self.ways]
+        return np.array(rows, int).reshape(len(rows), longest)
+
+    def so(self, world: World) -> jax.Array:
+        """`[n_ways, B]` whether what each supposes to be held is, and nothing else."""
+        always = jnp.ones(world.held.shape[-1], bool)
+        flags = [
+            [always, *(world.held[thing] == held for thing, held in way.held)]
+            for way in self.ways
+        ]
+        return jnp.stack([jnp.all(jnp.stack(own), 0) for own in flags])
+
 
 class Extent(NamedTuple):
-    """How far geoms go beyond the first joint above them, by geom id; leaves `[n, B]`."""
+    """How far geoms go beyond the first joint above them; leaves `[n, B]` or `[n, 1]`."""
 
     across: jax.Array
     """At most this from its axis [m]."""
@@ -69,22 +83,33 @@ class Extent(NamedTuple):
     """At most this from its anchor [m]."""
 
     def of(self, side: Sequence[Sequence[int]]) -> "Extent":
-        """The greatest of some geoms, `[n, B]`."""
+        """The greatest of some geoms each."""
+        if all(len(geoms) == 1 for geoms in side):
+            return Extent(*(leaf[np.concatenate(side)] for leaf in self))
         rows = [np.array(geoms) for geoms in side]
-        if all(len(geoms) == 1 for geoms in rows):
-            return Extent(*(leaf[np.concatenate(rows)] for leaf in self))
         return Extent(*(jnp.stack([leaf[g].max(0) for g in rows]) for leaf in self))
 
 
 def rates_of(scene: Scene) -> np.ndarray:
-    """`[n, d]` how far each joint (arm's, passive, dependent) moves per arm's joint."""
+    """`[n, d]` how far joints (the arm's, passive, dependent) move by each of the arm's."""
     if getattr(scene.structure, "dependent", ()):
         return scene.rates  # pyright: ignore[reportAttributeAccessIssue]
     return np.eye(len(scene.joints) + len(scene.passive), len(scene.joints))
 
 
+def link_rates(scene: Scene) -> np.ndarray:
+    """`[1 + n_links, d]` how far the links' joints move by each of the arm's."""
+    rates = np.concatenate([rates_of(scene), np.zeros((1, len(scene.joints)))])
+    return rates[[-1, *(link.variable for link in scene.structure.links)]]
+
+
+def link_slides(scene: Scene) -> np.ndarray:
+    """`[1 + n_links]` bool."""
+    return np.array([False, *(link.slides for link in scene.structure.links)])
+
+
 def find_ways(scene: Scene) -> Ways:
-    """Which joints count for each side of each contact group."""
+    """Which joints count for each side of each contact."""
     order: dict[Way, int] = {Way((), ()): 0}
     of_side = {}
     for index, group in enumerate(scene.groups):
@@ -104,158 +129,104 @@ def find_ways(scene: Scene) -> Ways:
 
 
 def _lines(scene: Scene, body: int) -> list[Way]:
-    """All joints of the arm above a body, for what the hand may hold or not."""
+    """All that the arm moves above a body; one for each: its object in the hand or not."""
     structure = scene.structure
-    hand = structure.link_of[scene.body_id(scene.hand)]
     own, thing = _line(scene, structure.link_of[body])
-    carrier, base = _line(scene, hand)
+    carrier, base = _line(scene, structure.link_of[scene.body_id(scene.hand)])
     if thing in (-1, base) or scene.objects[thing] in scene.mocap:
         return [Way(own, ())]
     return [Way(own, ((thing, False),)), Way((*own, *carrier), ((thing, True),))]
 
 
 def _line(scene: Scene, row: int) -> tuple[tuple[int, ...], int]:
-    """Rows above with a joint that the arm moves, and the object at the end, or -1."""
-    links, moves = scene.structure.links, rates_of(scene).any(1)
-    rows, thing = [], -1
+    """Links above, a link included, whose joint the arm moves; the object above, or -1."""
+    moves, rows, thing = link_rates(scene).any(1), [], -1
     while row:
-        link = links[row - 1]
-        if link.variable >= 0 and moves[link.variable]:
+        link = scene.structure.links[row - 1]
+        if moves[row]:
             rows.append(row)
         row, thing = link.parent, max(thing, link.object)
     return tuple(rows), thing
 
 
-def link_motion(scene: Scene, motion: jax.Array) -> jax.Array:
-    """`[1 + n_links, ...]` how far each link's joint moves; `motion` is `[d, ...]`."""
-    rates = np.concatenate([rates_of(scene), np.zeros((1, len(scene.joints)))])
-    rows = [-1, *(link.variable for link in scene.structure.links)]
-    each = jnp.asarray(rates[rows], motion.dtype)
-    return jnp.tensordot(each, jnp.abs(motion), 1, precision="highest")
-
-
-def extents(scene: Scene, world: World, ways: Ways) -> Extent:
-    """How far the geoms go beyond the first joints of their ways.
+def extents(scene: Scene, ways: Ways, poses: jax.Array) -> Extent:
+    """Of all geoms by id; of those that the arm never moves 0.
 
     Args:
         scene: The scene.
-        world: Leaves with the batch last.
         ways: `find_ways`.
+        poses: `[1 + n_links, 3, 4, B]` of the links, wherever the arm is.
     """
-    poses = link_poses(scene, world, rest(scene, world))
+    model, links = scene.mj_model, scene.structure.link_of
     anchor, axis = joint_axes(scene, poses)
-    model = scene.mj_model
     first = {
         body: ways.ways[row].links[0]
         for (_, body), rows in ways.of_side.items()
         for row in rows
     }
-    across = jnp.zeros((model.ngeom, poses.shape[-1]), poses.dtype)
-    extent = Extent(across, across)
-    for kind, geoms in _by_kind(scene, first).items():
-        bodies = [int(model.geom_bodyid[geom]) for geom in geoms]
-        own = read(scene, geoms)
-        placed = in_world(
-            own, poses, np.array([scene.structure.link_of[b] for b in bodies])
-        )
-        rows = np.array([first[body] for body in bodies])
-        offset = minus(placed.centre, _coordinates(anchor[rows]))
-        turned = cross(offset, _coordinates(axis[rows]))
-        spread = core_radius(kind, own)
-        extent = Extent(
-            extent.across.at[np.array(geoms)].set(_norm(turned) + spread),
-            extent.beyond.at[np.array(geoms)].set(_norm(offset) + spread),
-        )
-    return extent
-
-
-def _by_kind(scene: Scene, bodies: dict[int, int]) -> dict[str, tuple[int, ...]]:
-    """Geoms of some bodies that are in a contact."""
     kinds: dict[str, dict[int, None]] = {}
     for group in scene.groups:
         for side in (side for contact in group.contacts for side in contact):
-            if side.body in bodies:
+            if side.body in first:
                 kinds.setdefault(side.kind, {}).update(dict.fromkeys(side.ids))
-    return {kind: tuple(ids) for kind, ids in kinds.items()}
+    across = beyond = jnp.zeros((model.ngeom, poses.shape[-1]), poses.dtype)
+    for kind, geoms in kinds.items():
+        ids = np.array([*geoms])
+        own, bodies = read(scene, tuple(geoms)), model.geom_bodyid[ids]
+        placed = in_world(own, poses, np.array([links[int(body)] for body in bodies]))
+        rows = np.array([first[int(body)] for body in bodies])
+        offset = minus(placed.centre, coordinates(anchor[rows]))
+        radius = core_radius(kind, own)
+        off_axis = norm(cross(offset, coordinates(axis[rows])))
+        across = across.at[ids].set(off_axis + radius)
+        beyond = beyond.at[ids].set(norm(offset) + radius)
+    return Extent(across, beyond)
 
 
 def core_radius(kind: str, shapes: Shapes) -> jax.Array:
-    """`[n, 1]` of a ball around the centre that holds the geom, but for its rounding [m].
+    """`[n, 1]` of a ball around the geom's core, which is all that turning moves [m].
 
-    A ball that turns about its centre stays what it is, so a sphere has none.
+    What is round around the core, the radius of a sphere or a capsule, goes with it.
     """
-    size = shapes.size
-    if kind == "sphere":
-        return jnp.zeros_like(size[0])
-    if kind == "capsule":
-        return size[1]
-    if kind == "cylinder":
-        return jnp.sqrt(size[0] ** 2 + size[1] ** 2)
-    if kind == "ellipsoid":
-        return jnp.maximum(jnp.maximum(size[0], size[1]), size[2])
+    size, corner = shapes.size, norm(shapes.size)
     if kind == "mesh":
-        return jnp.max(jnp.sqrt(sum(x * x for x in shapes.vertices)), 0)
-    return jnp.sqrt(sum(x * x for x in size))
-
-
-def rest(scene: Scene, world: World) -> jax.Array:
-    """`[d, B]` the joints at their reference."""
-    middle = jnp.asarray(scene.model.qpos0)[scene.addresses(scene.joints)]
-    width = max(leaf.shape[-1] for leaf in world)
-    return jnp.broadcast_to(middle[:, None], (len(middle), width))
+        return jnp.max(norm(list(shapes.vertices)), 0)
+    return {
+        "sphere": jnp.zeros_like(corner),
+        "capsule": size[1],
+        "cylinder": jnp.sqrt(size[0] * size[0] + size[1] * size[1]),
+        "ellipsoid": jnp.maximum(jnp.maximum(size[0], size[1]), size[2]),
+    }.get(kind, corner)
 
 
 def joint_axes(scene: Scene, poses: jax.Array) -> tuple[jax.Array, jax.Array]:
     """A point and the direction of each link's joint in the world, `[1 + n_links, 3, B]`."""
     joints = np.array([0, *(link.joint for link in scene.structure.links)])
-    point = scene.model.jnt_pos[joints].T[:, :, None]
-    along = scene.model.jnt_axis[joints].T[:, :, None]
-    rotation = [poses[:, :, k] for k in range(3)]
-    anchor = sum(rotation[k] * point[k][:, None] for k in range(3)) + poses[:, :, 3]
-    return anchor, sum(rotation[k] * along[k][:, None] for k in range(3))
+    point, along = (
+        getattr(scene.model, field)[joints][..., None]
+        for field in ("jnt_pos", "jnt_axis")
+    )
+
+    def turned(vectors: jax.Array) -> jax.Array:
+        return sum(poses[:, :, k] * vectors[:, k, None] for k in range(3))
+
+    return turned(point) + poses[:, :, 3], turned(along)
 
 
-def _coordinates(vectors: jax.Array) -> Vector:
+def coordinates(vectors: jax.Array) -> Vector:
+    """`[n, 3, B]` taken apart."""
     return [vectors[:, k] for k in range(3)]
 
 
-def _norm(vector: Vector) -> jax.Array:
+def norm(vector: Vector) -> jax.Array:
+    """Its length."""
     return jnp.sqrt(dot(vector, vector))
-
-
-class Travel(NamedTuple):
-    """How the first joints' anchors of all ways move; leaves `[n_ways, B]`."""
-
-    twist: jax.Array
-    """The first joint turns by at most this [rad]."""
-    shift: jax.Array
-    """Its anchor moves by at most this [m]."""
-    turn: jax.Array
-    """The others turn by at most this together [rad]."""
-
-    def of(self, sides: Sequence[tuple[int, ...]], extent: Extent) -> jax.Array | float:
-        """`[n, B]` how far geoms move [m].
-
-        Args:
-            sides: n of `Ways.of_side`.
-            extent: Of the geoms, `[n, B]` or `[1, B]`.
-        """
-        longest = max(map(len, sides))
-        table = np.array(
-            [(*side, *(longest - len(side)) * (0,)) for side in sides], int
-        )
-        return sum(
-            self.twist[rows] * extent.across
-            + self.shift[rows]
-            + self.turn[rows] * extent.beyond
-            for rows in table.reshape(len(sides), longest).T
-        )
 
 
 def travel_from(
     scene: Scene, world: World, ways: Ways, poses: jax.Array, motion: jax.Array
-) -> Travel:
-    """How far all ways carry, from the configuration at hand.
+) -> jax.Array:
+    """How far each way moves what stands at its end, from the configuration at hand.
 
     Args:
         scene: The scene.
@@ -263,38 +234,45 @@ def travel_from(
         ways: `find_ways`.
         poses: `[1 + n_links, 3, 4, B]` where the links are.
         motion: `[d, B]` how far each joint moves at most [rad or m].
+
+    Returns:
+        `[n_ways, 3, B]` at most: the angle of the first joint [rad], the path of its anchor
+        [m], and the angles of the other joints together [rad]. Zero for a way that is not so.
     """
     anchor, axis = joint_axes(scene, poses)
-    moved = link_motion(scene, motion)
-    slides = np.array([False, *(link.slides for link in scene.structure.links)])
-    longest = max(len(way.links) for way in ways.ways)
-    # Row 0, the world, does not move: it fills the ways up.
-    order = np.array([(*w.links, *(longest - len(w.links)) * (0,)) for w in ways.ways])
-    order = order.reshape(len(ways.ways), longest)
-    first = order[:, 0]
-    twist = jnp.where(slides[first][:, None], 0, moved[first])
-    shift = turn = jnp.zeros_like(twist)
-    for step in range(longest):
-        rows = order[:, step]
-        offset = _coordinates(anchor[first] - anchor[rows])
-        far = _norm(cross(offset, _coordinates(axis[rows])))
-        linear, own = slides[rows][:, None], moved[rows]
-        shift = shift + own * jnp.where(linear, 1, far + shift)
+    rates = jnp.asarray(link_rates(scene), motion.dtype)
+    moved = jnp.tensordot(rates, jnp.abs(motion), 1, precision="highest")
+    slides, order = link_slides(scene)[:, None], ways.order()
+    first = order[:, :1].ravel()
+    twist = jnp.where(slides[first], 0, moved[first])
+    path = turn = jnp.zeros_like(twist)
+    for step, rows in enumerate(order.T):
+        offset = coordinates(anchor[first] - anchor[rows])
+        far = norm(cross(offset, coordinates(axis[rows])))
+        path = path + moved[rows] * jnp.where(slides[rows], 1, far + path)
         if step:
-            turn = turn + jnp.where(linear, 0, own)
-    travel = Travel(twist, shift, turn)
+            turn = turn + jnp.where(slides[rows], 0, moved[rows])
+    travel = jnp.stack(jnp.broadcast_arrays(twist, path, turn), 1)
     if any(way.held for way in ways.ways):
-        so = _so(world, ways)
-        travel = Travel(*(jnp.where(so, leaf, 0) for leaf in travel))
-    # Otherwise it is computed again for each geom.
-    return once(travel)
+        travel = jnp.where(ways.so(world)[:, None], travel, 0)
+    return once(travel)  # or it would be computed again for each geom
 
 
-def _so(world: World, ways: Ways) -> jax.Array:
-    """`[n_ways, B]` whether what each way supposes to be held is."""
-    always = jnp.ones((1, world.held.shape[-1]), bool)
-    flags = [
-        [always[0], *(world.held[thing] == held for thing, held in way.held)]
-        for way in ways.ways
-    ]
-    return jnp.stack([jnp.all(jnp.stack(own), 0) for own in flags])
+def moved_by(
+    travel: jax.Array, sides: Sequence[tuple[int, ...]], extent: Extent
+) -> jax.Array | float:
+    """`[n, B]` how far geoms move at most [m].
+
+    Args:
+        travel: `travel_from`.
+        sides: `[n]` of `Ways.of_side`.
+        extent: Of the geoms; leaves `[n, B]` or `[1, B]`.
+    """
+    longest = max(map(len, sides))
+    table = np.array([(*side, *(longest - len(side)) * (0,)) for side in sides], int)
+    moved = 0.0
+    for rows in table.reshape(len(sides), longest).T:
+        # One gather: XLA vectorises what reads one array, not what reads three.
+        own = travel[rows]
+        moved += own[:, 0] * extent.across + own[:, 1] + own[:, 2] * extent.beyond
+    return moved
