@@ -12,6 +12,7 @@ import json
 import time
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, field
+from itertools import count, islice
 from pathlib import Path
 from typing import NamedTuple
 
@@ -44,6 +45,8 @@ class Args:
     data: Path = field(default_factory=data_directory)
     """Directory with the Panda's spheres and the problems."""
     paths: int = 500
+    first: int = 0
+    """How many paths to pass over, so that a long run can be made in parts."""
     margin: float = 0.002
     """Of the planner [m]."""
     tolerance: float = 0.001
@@ -83,11 +86,9 @@ def main(args: Args) -> None:
     """Measures, prints, writes JSON."""
     outcomes = []
     with tqdm(total=args.paths, unit="path") as bar:
-        for path in planned(args):
+        for path in islice(planned(args), args.first, args.first + args.paths):
             outcomes.append(judged(path, args.tolerance, args.fine))
             bar.update()
-            if len(outcomes) == args.paths:
-                break
     proven = sum(outcome.proven for outcome in outcomes)
     ratios = np.array([o.seconds[1] / o.seconds[0] for o in outcomes])
     result = {
@@ -125,7 +126,7 @@ def planned(args: Args) -> Iterator[Planned]:
         scene = Scene.from_mjcf(panda_mjcf(robot), slots=slots_for(problems))
         planners[name] = Planner(scene, PlannerConfig(margin=args.margin))
     longest = max(map(len, sets.values()))
-    for number in range(10**6):
+    for number in count():
         seed, index = divmod(number, longest)
         for name, problems in sets.items():
             if index >= len(problems):
@@ -142,15 +143,15 @@ def judged(path: Planned, tolerance: float, fine: float) -> Outcome:
     """Both certificates, in turns, the better of two times; and the fine samples."""
     _, scene, world, waypoints = path
     seconds = [np.inf, np.inf]
-    verdicts = [certify(scene, world, waypoints, continuous=c) for c in (False, True)]
-    for _ in range(2):
-        for k in (0, 1):
-            began = time.perf_counter()
-            verdicts[k] = certify(
-                scene, world, waypoints, tolerance=tolerance, continuous=k == 1
-            )
-            seconds[k] = min(seconds[k], time.perf_counter() - began)
-    sampled, proof = verdicts
+    verdicts = []
+    for continuous in (False, True) * 2:  # the first time, they compile
+        began = time.perf_counter()
+        verdicts.append(
+            certify(scene, world, waypoints, tolerance=tolerance, continuous=continuous)
+        )
+        took = time.perf_counter() - began
+        seconds[continuous] = min(seconds[continuous], took)
+    sampled, proof = verdicts[-2:]
     finest = certify(scene, world, waypoints, fine, tolerance)
     lower = proof.clearance if proof.proven else -np.inf
     return Outcome(
