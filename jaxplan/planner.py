@@ -170,6 +170,7 @@ class Planner:
             speed * self._velocity,
             speed**2 * self._acceleration,
             self._trajectory,
+            swept_free=lambda problem, q, motion: self._swept(plan.world, q, motion),
         )
         q, qd, qdd = (x[0, : timed.length[0]] for x in (timed.q, timed.qd, timed.qdd))
         free = bool(timed.rung[0] != Rung.INVALID)
@@ -217,6 +218,15 @@ class Planner:
         margin = self.config.margin
         return _jit(
             lambda world, q: collision.config_free(self.scene, world, q, margin)
+        )
+
+    @cached_property
+    def _swept(self) -> Callable:
+        margin = self.config.margin
+        return _jit(
+            lambda world, q, motion: collision.config_free(
+                self.scene, world, q, margin, motion=motion
+            )
         )
 
     def _plan(
