@@ -11,7 +11,7 @@ from jaxplan.trajectory.spline import arc_length, at_arc_length, fit_polyline
 from jaxplan.trajectory.validation import Validation
 
 _SMALLEST_SAVING = 1e-3  # [rad]; less is not worth a check
-_QUARTERS = np.array([0.25, 0.5, 0.75])[:, None]
+_INNER = np.arange(1, 16)[:, None] / 16.0  # where all candidates are asked
 
 
 def shortcut(
@@ -32,8 +32,8 @@ def shortcut(
     by the same full turns: q is then an angle that may leave [-pi, pi], and the path
     ends at q_goal but for full turns.
 
-    To keep checks few, all candidates are asked at three inner points first; the rest
-    are asked in full from the largest saving down, until one is free.
+    To keep checks few, all candidates are asked at a few inner points first; those that
+    are left are asked in full from the largest saving down, until one is free.
 
     Args:
         paths: P arrays `[W_p, d]` of waypoints [rad].
@@ -101,7 +101,7 @@ def _longest_free(
     """The first free line of each problem's list, for problems that have one."""
     problem = [p for p, candidates in lines.items() for _ in candidates]
     flat = [line for candidates in lines.values() for line in candidates]
-    inner = [line.a + _QUARTERS * (line.b - line.a) for line in flat]
+    inner = [line.a + _INNER * (line.b - line.a) for line in flat]
     hopeful = validation.points_free(problem, inner)
     waiting: dict[int, list[_Line]] = {}
     for p, line, hope in zip(problem, flat, hopeful, strict=True):
