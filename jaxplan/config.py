@@ -32,7 +32,7 @@ class PlannerConfig(Checked):
 
     method: Literal["rrt", "rrt_connect", "ao_rrt_connect"] = "rrt_connect"
     """`ao_rrt_connect` uses all of `max_expansions` to find ever shorter paths."""
-    max_expansions: Count = 20_000
+    max_expansions: Count = 50_000
     """N_rrt: proposals whose motion is checked, each connect step included."""
     p_uniform: Probability = 0.2
     """Probability that a proposal is a uniform segment and not a learned one, if there is a
