@@ -272,6 +272,32 @@ def test_one_hinge_and_one_sphere_have_the_closed_form():
         assert not ask(scene, own, q, least + 1e-5, "fast", h)
 
 
+STRETCHED = """<mujoco><compiler angle="radian"/><worldbody>
+  <geom name="post" size=".1" pos="0 3 0"/>
+  <body name="upper"><joint name="j" axis="0 0 1"/>
+    <geom size=".02" contype="0" conaffinity="0"/>
+    <body name="fore" pos=".5 0 0"><joint name="k" axis="0 0 1" pos=".1 0 0"/>
+      <geom name="rod" type="capsule" size=".02 .1" pos=".4 0 0" quat="1 0 1 0"/></body></body>
+</worldbody></mujoco>"""
+
+
+def test_a_stretched_arm_has_the_closed_form():
+    scene = Scene.from_mjcf(STRETCHED)
+    world, q = make_world(scene), np.zeros(2, np.float32)
+    rod, post = (scene.mj_model.geom(n).id for n in ("rod", "post"))
+    least = float(distance(scene, world, q))
+    for motion, moved in (
+        ([0.1, 0.0], 0.1 * 1.0),
+        ([0.0, 0.1], 0.1 * 0.4),
+        ([0.1, 0.1], 0.1 * 1.4),
+    ):
+        bounds = pair_motion_bounds(scene, world, motion)
+        np.testing.assert_allclose(bounds[rod, post], moved, atol=1e-6)
+        h = np.array(motion, np.float32)
+        assert ask(scene, world, q, least - moved - 1e-5, "fast", h)
+        assert not ask(scene, world, q, least - moved + 1e-5, "fast", h)
+
+
 def test_held_things_hang_on_the_hand():
     scene = Scene.from_mjcf(
         """<mujoco><worldbody><geom name="post" size=".1" pos="0 3 0"/>

@@ -28,6 +28,7 @@ from jaxplan.collision.shapes import (
     minus,
     once,
     read,
+    total,
 )
 from jaxplan.collision.world import World
 from jaxplan.scene import Scene
@@ -140,7 +141,7 @@ def _lines(scene: Scene, body: int) -> list[Way]:
 
 def _line(scene: Scene, row: int) -> tuple[tuple[int, ...], int]:
     """Links above, a link included, whose joint the arm moves; the object above, or -1."""
-    moves, rows, thing = link_rates(scene).any(1), [], -1
+    moves, rows, thing = np.any(link_rates(scene), 1), [], -1
     while row:
         link = scene.structure.links[row - 1]
         if moves[row]:
@@ -208,7 +209,7 @@ def joint_axes(scene: Scene, poses: jax.Array) -> tuple[jax.Array, jax.Array]:
     )
 
     def turned(vectors: jax.Array) -> jax.Array:
-        return sum(poses[:, :, k] * vectors[:, k, None] for k in range(3))
+        return total(poses[:, :, k] * vectors[:, k, None] for k in range(3))
 
     return turned(point) + poses[:, :, 3], turned(along)
 
