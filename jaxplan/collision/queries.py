@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from jaxplan.collision.bounds import group_bounds, pair_reaches
 from jaxplan.collision.engine import least_scores
+from jaxplan.collision.margins import required_clearances
 from jaxplan.collision.mjx_backend import least_distances
 from jaxplan.collision.narrow import Score
 from jaxplan.collision.world import OWN_AXES, World, batch_shape
@@ -36,7 +37,7 @@ def clearance(
         `[...]` [m], negative = penetration; NaN where q or the world is not finite, or a
         quaternion is zero.
     """
-    return _flat(scene, world, q, Score(exact=True), backend)
+    return _flat(scene, world, q, None, backend)
 
 
 def config_free(
@@ -48,6 +49,9 @@ def config_free(
     motion: jax.Array | None = None,
 ) -> jax.Array:
     """Whether clearance > margin; False where something is not finite.
+
+    Of each pair the margin is the greater of this one and the model's own, the sum of its
+    geoms' or that of an explicit pair (`required_clearances`).
 
     Args:
         scene: The scene.
@@ -61,8 +65,7 @@ def config_free(
     Returns:
         `[...]` bool.
     """
-    score = Score(backend == "mjx", jnp.asarray(margin, jnp.float32))
-    return _flat(scene, world, q, score, backend, motion) > 0
+    return _flat(scene, world, q, _single(margin), backend, motion) > 0
 
 
 def motion_free(
@@ -163,18 +166,20 @@ def _flat(
     scene: Scene,
     world: World,
     q: jax.Array,
-    score: Score,
+    margin: jax.Array | None,
     backend: Backend,
     motion: jax.Array | None = None,
 ) -> jax.Array:
-    """Asks the backend about the flattened batch."""
+    """Asks the backend about the flattened batch; no margin: for distances."""
     scene, world, q, motion = jax.tree.map(_single, (scene, world, q, motion))
     given = [q] if motion is None else [q, motion]
     shape, finite, flat, rows = _flatten(world, *given)
     if backend == "fast":
+        score = Score(exact=True) if margin is None else Score(False, margin)
         scores = least_scores(scene, flat, rows[0], score, *rows[1:])
     else:
-        scores = least_distances(scene, flat, rows[0]) - score.margin
+        table = None if margin is None else required_clearances(scene, margin)
+        scores = least_distances(scene, flat, rows[0], table)
         if motion is not None and scene.groups:
             scores -= jnp.max(group_bounds(scene, flat, rows[1]), 0)
     return jnp.where(finite, scores.reshape(shape), jnp.nan)
