@@ -89,7 +89,7 @@ def absent_rows(part: str, scene: str) -> list[Row]:
 
 
 def refused(robot: dict, queries: Sequence[Query]) -> list[str]:
-    """What C MuJoCo says against paths, at 0.01 rad and 1 mm.
+    """What `certify` says against paths: every 5 mm, no contact deeper than 1 mm.
 
     It checks scenes made from the obstacles themselves, without slots.
     """
@@ -100,12 +100,10 @@ def refused(robot: dict, queries: Sequence[Query]) -> list[str]:
         if not answer.solved:
             continue
         scene = scene_of(first.setdefault(id(problem), i))
-        verdict = certify(scene, make_world(scene), answer.path, 0.01, 0.001)
+        verdict = certify(scene, make_world(scene), answer.path)
         if not verdict.valid:
-            deep = -1000 * verdict.clearance
             found.append(
-                f"{problem.set} {problem.index}, seed {seed}: {verdict.pair}, "
-                f"{deep:.2f} mm deep"
+                f"{problem.set} {problem.index}, seed {seed}: {verdict.reason}"
             )
     return found
 

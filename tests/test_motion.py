@@ -128,7 +128,7 @@ def test_motions_are_certified_by_mujoco(motion, mug_planner, worlds, lane):
     first = motion.result.path[lane, 0]
     q = motion.q[lane]
     after = q[int(np.argmin(np.linalg.norm(q - first, axis=1))) :]
-    certificate = collision.certify(mug_planner.scene, world, after, 0.01, 0.001)
+    certificate = collision.certify(mug_planner.scene, world, after)
     assert certificate.valid, certificate
 
 

@@ -73,7 +73,8 @@ def least_convex(
     radius = cores.radius[a] + cores.radius[b]
     least, most = _balls(cores, a, b)
     if score.exact:
-        reach = jnp.min(jnp.where(counts, most - radius, jnp.inf), 0) + SLACK
+        nearest = jnp.where(counts, most - radius - score.margin, jnp.inf)
+        reach = jnp.min(nearest, 0) + SLACK + score.margin
     else:
         reach = score.margin
     near = (least - radius <= reach) & counts
@@ -86,7 +87,8 @@ def least_convex(
         own = score._replace(margin=_of_pairs(score.margin, rows))
         tiles = partial(_in_tiles, cores, a[rows], b[rows], (one, other), own.margin)
         thick = radius[rows]
-        close = tiles(_box_gap, near[rows], jnp.inf) - thick <= _of_pairs(reach, rows)
+        gap = tiles(_box_gap, near[rows], jnp.inf) - thick
+        close = near[rows] & (gap <= _of_pairs(reach, rows))
         found = tiles(partial(_squared, score.exact), close, jnp.inf)
         scores = own.of_squared(found, thick)
         if score.exact:

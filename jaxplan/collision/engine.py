@@ -14,16 +14,16 @@ import numpy as np
 
 from jaxplan.collision.convex import least_convex
 from jaxplan.collision.fronts import (
-    ConvexPairs,
     Front,
     find_convex_pairs,
     find_fronts,
 )
 from jaxplan.collision.kinematics import link_poses, rotation_of
-from jaxplan.collision.margins import required
+from jaxplan.collision.margins import Rule, required
 from jaxplan.collision.narrow import CLOSED
 from jaxplan.collision.reach import (
     Extent,
+    Ways,
     extents,
     find_ways,
     moved_by,
@@ -85,7 +85,11 @@ def least_scores(
             return _least_over_slots(function, own, world, rows, score)
         frame = poses[scene.structure.link_of[front.obstacles[0].body]]
         near = seen_from(own, frame)
-        rated = [function(near, shapes(o.ids, world), score) for o in front.obstacles]
+        rated, first = [], 0
+        for o in front.obstacles:
+            own = score.among(first, len(o.ids))
+            rated.append(function(near, shapes(o.ids, world), own))
+            first += len(o.ids)
         return reduce(smaller, rated)
 
     def convex(
@@ -113,38 +117,51 @@ def least_scores(
         if motion is not None:
             travel = travel_from(scene, world, ways, poses, motion)
 
-        def own_score(
-            part: Front | ConvexPairs, *sides: Sequence[Sequence[int]]
-        ) -> Score:
-            margin = score.margin if score.exact else required(part.rules, score.margin)
-            if travel is not None and extent is not None:
-                for side in sides:
-                    own = ways.of_geoms(scene, part.groups, side)
-                    margin += moved_by(travel, own, extent.of(side))
-            return score._replace(margin=margin)
+        def nearer(
+            groups: Sequence[int], *sides: Sequence[Sequence[int]]
+        ) -> jax.Array | float:
+            if travel is None or extent is None:
+                return 0.0
+            return sum(
+                moved_by(travel, ways.of_geoms(scene, groups, side), extent.of(side))
+                for side in sides
+            )
 
         least = []
         for front in fronts:
             obstacles = [geom for o in front.obstacles for geom in o.ids]
             facing = [(geom,) for geom in front.facing]
-            own = own_score(front, facing, [obstacles])
-            rated = scores(front, poses, world, own)
+            closer = nearer(front.groups, facing, [obstacles])
+            margins = _margins(front.rules, score, closer)
+            rated = scores(front, poses, world, score._replace(margin=margins))
             rated = jnp.where(counts[np.array(front.groups)], rated, jnp.inf)
             least.append(jnp.min(rated, 0))
         if pairs.pairs:
             sides = (
                 [(geom,) for geom in side] for side in zip(*pairs.pairs, strict=True)
             )
-            own = own_score(pairs, *sides)
-            least.append(convex(poses, world, counts, own))
+            closer = nearer(pairs.groups, *sides)
+            (margins,) = _margins([pairs.rules], score, closer)
+            rated = score._replace(margin=margins)
+            least.append(convex(poses, world, counts, rated))
         return reduce(smaller, least)
 
-    ways, extent = find_ways(scene), None
+    ways, extent = Ways((), {}), None
     if motion is not None:
         width = max(leaf.shape[-1] for leaf in world)
         anywhere = jnp.zeros((len(q), width), q.dtype)
+        ways = find_ways(scene)
         extent = extents(scene, ways, link_poses(scene, world, anywhere))
     return _in_blocks(block, q, world, motion, extent)
+
+
+def _margins(
+    rules: Sequence[Sequence[Rule]], score: Score, closer: jax.Array | float
+) -> list[jax.Array | float]:
+    """`[n, B]`, `[n, 1]` or a number [m], by obstacle: what its pairs ask for and move."""
+    if score.exact:
+        return [score.margin + closer for _ in rules]
+    return [required(own, score.margin) + closer for own in rules]
 
 
 def _in_slots(world: World, rows: list[int]) -> Shapes:
@@ -166,14 +183,14 @@ def _least_over_slots(
     axes = [[still + (i == k) for i in range(3)] for k in range(3)]
     rated = []
     # Written out: in a loop, XLA on CPU takes three times as long.
-    for row in rows:
+    for j, row in enumerate(rows):
         pose, size = world.slot_pose[row], world.slot_size[row]
         if pose.shape[-1] == 1:  # numbers are faster than rows of one
             pose, size = pose[:, 0], size[:, 0]
         frame = jnp.concatenate([rotation_of(pose[3:]), pose[:3, None]], 1)
         near = seen_from(own, frame)
         size = [jnp.atleast_2d(size[k]) for k in range(3)]
-        rated.append(function(near, Shapes([still] * 3, axes, size), score))
+        rated.append(function(near, Shapes([still] * 3, axes, size), score.among(j, 1)))
     return reduce(smaller, rated)
 
 

@@ -7,7 +7,7 @@ pairs go one by one to the search for convex geoms.
 from collections import defaultdict
 from typing import NamedTuple
 
-from jaxplan.collision.margins import Rule, alike, pair_rules
+from jaxplan.collision.margins import Rule, pair_rules
 from jaxplan.collision.narrow import CLOSED
 from jaxplan.scene import Geoms, Scene, geom_pairs
 
@@ -21,8 +21,8 @@ class Front(NamedTuple):
     """Kinematic link of each."""
     groups: tuple[int, ...]
     """Contact group of each."""
-    rules: tuple[Rule, ...]
-    """What each asks of all of the obstacles."""
+    rules: tuple[tuple[Rule, ...], ...]
+    """By obstacle: what each asks for."""
     obstacles: tuple[Geoms, ...]
     kinds: tuple[str, str]
 
@@ -49,22 +49,21 @@ def find_fronts(scene: Scene) -> list[Front]:
             if (contact.a.kind, contact.b.kind) not in CLOSED:
                 continue
             moves = contact.a.ids[0] in slots
-            for own, ids in alike(rules, contact.a.ids, contact.b.ids).items():
-                obstacles = contact.b._replace(ids=ids)
-                facing[obstacles, contact.a.kind, moves].append((contact.a, index, own))
+            facing[contact.b, contact.a.kind, moves].append((contact.a, index))
     together = defaultdict(list)
     for (obstacle, kind, _), sides in facing.items():
         key = tuple(sides), obstacle.body, (kind, obstacle.kind)
         together[key].append(obstacle)
     fronts = []
     for (sides, _, kinds), obstacles in together.items():
-        rows = [
-            (geom, side.body, index, rule)
-            for side, index, own in sides
-            for geom, rule in zip(side.ids, own, strict=True)
-        ]
-        geoms, bodies, groups, asked = zip(*rows, strict=True)
+        rows = [(g, s.body, index) for s, index in sides for g in s.ids]
+        geoms, bodies, groups = zip(*rows, strict=True)
         links = tuple(scene.structure.link_of[body] for body in bodies)
+        asked = tuple(
+            tuple(rules[geom, obstacle] for geom in geoms)
+            for o in obstacles
+            for obstacle in o.ids
+        )
         fronts.append(Front(geoms, links, groups, asked, tuple(obstacles), kinds))
     return fronts
 

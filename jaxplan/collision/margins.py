@@ -5,7 +5,7 @@ pair where there is one; gaps only widen what it looks at. So is it here. And a 
 is always near, such as two links around a joint, keeps no margin that it cannot keep.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import jax
@@ -34,7 +34,7 @@ def pair_rules(scene: Scene) -> dict[tuple[int, int], Rule]:
     override = bool(model.opt.enableflags & mujoco.mjtEnableBit.mjENBL_OVERRIDE)
     listed = zip(model.pair_geom1, model.pair_geom2, model.pair_margin, strict=True)
     explicit = {frozenset((int(i), int(j))): own for i, j, own in listed}
-    near = {frozenset(pair): far for pair, far in _near(scene).items()}
+    near = {frozenset(pair): far for pair, far in scene.structure.near.items()}
 
     def rule(i: int, j: int) -> Rule:
         pair = frozenset((i, j))
@@ -50,12 +50,8 @@ def pair_rules(scene: Scene) -> dict[tuple[int, int], Rule]:
     }
 
 
-def _near(scene: Scene) -> dict[tuple[int, int], float]:
-    return getattr(scene.structure, "near", {})
-
-
 def required(rules: Sequence[Rule], margin: jax.typing.ArrayLike) -> jax.Array:
-    """`[n, 1]` the distance above which pairs are free, for a user's margin [m].
+    """`[n, 1]` the distances above which pairs are free, for a user's margin [m].
 
     The margin itself where all of the pairs are plain.
     """
@@ -85,14 +81,3 @@ def required_clearances(scene: Scene, margin: jax.typing.ArrayLike = 0.0) -> jax
     kept = jnp.ravel(required([*rules.values()], margin))
     i, j = np.array([*rules]).T
     return table.at[i, j].set(kept).at[j, i].set(kept)
-
-
-def alike(
-    rules: dict[tuple[int, int], Rule], facing: Iterable[int], ids: Iterable[int]
-) -> dict[tuple[Rule, ...], tuple[int, ...]]:
-    """Obstacles by their rules with all geoms that face them."""
-    facing, parts = tuple(facing), {}
-    for obstacle in ids:
-        own = tuple(rules[geom, obstacle] for geom in facing)
-        parts[own] = (*parts.get(own, ()), obstacle)
-    return parts

@@ -12,6 +12,7 @@ import numpy as np
 
 from jaxplan.collision.world import World, object_address
 from jaxplan.scene import Scene
+from jaxplan.scene.dependent import follow
 from jaxplan.scene.quiet_mjx import mjx
 
 
@@ -63,9 +64,12 @@ def least_distances(
 
 
 def _qpos(scene: Scene, world: World, q: jax.Array) -> jax.Array:
-    qpos = scene.model.qpos0
-    qpos = jnp.asarray(qpos).at[scene.addresses(scene.joints)].set(q)
-    qpos = qpos.at[scene.addresses(scene.passive)].set(world.passive)
+    qpos = jnp.asarray(scene.model.qpos0)
+    address = scene.mj_model.jnt_qposadr[[*scene.structure.variables]]
+    given = jnp.concatenate([q, world.passive])
+    moved = given - qpos[address[: len(given)]]
+    moved = jnp.stack(follow(scene.structure.dependent, moved))
+    qpos = qpos.at[address].add(moved)
     for i, name in enumerate(scene.objects):
         start = object_address(scene, name)
         qpos = qpos.at[start : start + 7].set(world.object_pose[i])

@@ -5,6 +5,7 @@ import numpy as np
 
 from jaxplan.collision.world import World, object_address
 from jaxplan.scene import Scene
+from jaxplan.scene.dependent import follow
 
 
 def qpos_rows(scene: Scene, worlds: World, q: np.ndarray) -> np.ndarray:
@@ -18,10 +19,22 @@ def qpos_rows(scene: Scene, worlds: World, q: np.ndarray) -> np.ndarray:
     qpos = np.tile(np.asarray(scene.model.qpos0, float), (len(q), 1))
     for names, values in ((scene.joints, q), (scene.passive, worlds.passive)):
         qpos[:, scene.addresses(names)] = values
+    couple(scene, qpos)
     for index, name in enumerate(scene.objects[: free_objects(scene)]):
         start = object_address(scene, name)
         qpos[:, start : start + 7] = worlds.object_pose[:, index]
     return qpos
+
+
+def couple(scene: Scene, qpos: np.ndarray) -> None:
+    """Sets the dependent joints to where their masters put them, in `qpos [n, nq]`."""
+    dependent, ids = scene.structure.dependent, [*scene.structure.variables]
+    address = scene.mj_model.jnt_qposadr[ids]
+    reference = np.asarray(scene.model.qpos0, float)[address]
+    free = len(ids) - len(dependent)
+    moved = follow(dependent, (qpos[:, address] - reference)[:, :free].T)
+    for column, zero, value in [*zip(address, reference, moved, strict=True)][free:]:
+        qpos[:, column] = zero + value
 
 
 def carry(scene: Scene, data: mujoco.MjData, held: np.ndarray) -> None:

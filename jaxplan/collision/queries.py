@@ -9,11 +9,14 @@ import numpy as np
 import numpy.typing as npt
 
 from jaxplan.collision.bounds import group_bounds, pair_reaches
+from jaxplan.collision.checks import checked
 from jaxplan.collision.engine import least_scores
 from jaxplan.collision.margins import required_clearances
 from jaxplan.collision.mjx_backend import least_distances
 from jaxplan.collision.narrow import Score
 from jaxplan.collision.world import OWN_AXES, World, batch_shape
+from jaxplan.process import refuse_fork
+from jaxplan.ranges import Count, NotNegative, Positive, check, numbers
 from jaxplan.scene import Scene
 
 Backend = Literal["fast", "mjx"]
@@ -23,7 +26,11 @@ only those about contact itself (margin 0) and the depth of penetration are to b
 
 
 def clearance(
-    scene: Scene, world: World, q: jax.Array, backend: Backend = "fast"
+    scene: Scene,
+    world: World,
+    q: jax.Array,
+    backend: Backend = "fast",
+    motion: jax.Array | None = None,
 ) -> jax.Array:
     """Least signed distance over all pairs that count.
 
@@ -32,12 +39,15 @@ def clearance(
         world: Its leading axes broadcast against those of q.
         q: `[..., d]` joints [rad].
         backend: Who answers.
+        motion: `[..., d]` [rad or m]. If given: a lower bound on it in every configuration
+            whose joints are each within `motion` of q, but for rounding in float32.
 
     Returns:
         `[...]` [m], negative = penetration; NaN where q or the world is not finite, or a
         quaternion is zero.
     """
-    return _flat(scene, world, q, None, backend)
+    world, q = checked(scene, world, q=q)
+    return _flat(scene, world, q, None, backend, motion)
 
 
 def config_free(
@@ -65,6 +75,9 @@ def config_free(
     Returns:
         `[...]` bool.
     """
+    world, q = checked(scene, world, q=q)
+    if not isinstance(margin, jax.Array):
+        margin = numbers("margin", margin)
     return _flat(scene, world, q, _single(margin), backend, motion) > 0
 
 
@@ -94,6 +107,8 @@ def motion_free(
     Returns:
         `[...]` bool.
     """
+    world, q0, q1 = checked(scene, world, q0=q0, q1=q1)
+    check("points", points, Count)
     share = (jnp.arange(points) + 1) / points
     q0, q1 = q0[..., None, :], q1[..., None, :]
     q = q0 + share[:, None] * (q1 - q0)
@@ -104,6 +119,8 @@ def motion_free(
 
 def points_for(length: float, resolution: float) -> int:
     """Configurations to check so that none of their gaps exceeds `resolution` [rad]."""
+    check("length", length, NotNegative)
+    check("resolution", resolution, Positive)
     return max(1, math.ceil(length / resolution - 1e-9))
 
 
@@ -122,19 +139,17 @@ def motion_bound(
         scene: The scene.
         world: Its leading axes broadcast against those of dq.
         dq: `[..., d]` from the start of the motion to its end [rad or m].
-        q_min: `[d]` lower limits [rad or m]; the scene's where None.
+        q_min: `[d]` lower limits [rad or m]; the scene's where None, which is for concrete
+            scenes where joints depend on others (`Scene.q_min`).
         q_max: `[d]` upper limits.
 
     Returns:
         `[...]` [m]; infinite where a hinge turns that has a slide without limits above it on
         the way to a geom, NaN where something is not finite.
     """
-    limits = q_min, q_max
-    own = scene.q_min, scene.q_max
-    bounds = [
-        x if given is None else given for x, given in zip(own, limits, strict=True)
-    ]
-    scene, world, dq, low, high = jax.tree.map(_single, (scene, world, dq, *bounds))
+    low = scene.q_min if q_min is None else q_min
+    high = scene.q_max if q_max is None else q_max
+    scene, world, dq, low, high = jax.tree.map(_single, (scene, world, dq, low, high))
     shape, finite, flat, (rows,) = _flatten(world, dq)
     if not scene.groups:
         return jnp.where(finite, 0.0, jnp.nan)
@@ -170,7 +185,9 @@ def _flat(
     backend: Backend,
     motion: jax.Array | None = None,
 ) -> jax.Array:
-    """Asks the backend about the flattened batch; no margin: for distances."""
+    """Asks the backend about the flattened batch; without a margin, for distances."""
+    refuse_fork()
+    check("backend", backend, Backend)
     scene, world, q, motion = jax.tree.map(_single, (scene, world, q, motion))
     given = [q] if motion is None else [q, motion]
     shape, finite, flat, rows = _flatten(world, *given)

@@ -91,16 +91,9 @@ class Extent(NamedTuple):
         return Extent(*(jnp.stack([leaf[g].max(0) for g in rows]) for leaf in self))
 
 
-def rates_of(scene: Scene) -> np.ndarray:
-    """`[n, d]` how far joints (the arm's, passive, dependent) move by each of the arm's."""
-    if getattr(scene.structure, "dependent", ()):
-        return scene.rates  # pyright: ignore[reportAttributeAccessIssue]
-    return np.eye(len(scene.joints) + len(scene.passive), len(scene.joints))
-
-
 def link_rates(scene: Scene) -> np.ndarray:
     """`[1 + n_links, d]` how far the links' joints move by each of the arm's."""
-    rates = np.concatenate([rates_of(scene), np.zeros((1, len(scene.joints)))])
+    rates = np.concatenate([scene.rates, np.zeros((1, len(scene.joints)))])
     return rates[[-1, *(link.variable for link in scene.structure.links)]]
 
 

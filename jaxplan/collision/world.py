@@ -1,30 +1,20 @@
 """What changes between queries: where things are, what is held, what may touch."""
 
-from collections.abc import Iterable, Sequence
-from typing import NamedTuple
+from collections.abc import Iterable
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 import numpy.typing as npt
+from jax.core import Tracer
 
+from jaxplan.collision.obstacles import Obstacle, fill
+from jaxplan.process import refuse_fork
+from jaxplan.ranges import check
 from jaxplan.scene import Scene
-
-SIZES = {"sphere": 1, "capsule": 2, "cylinder": 2, "ellipsoid": 3, "box": 3}
-"""Numbers that give an obstacle's size."""
-FAR = (0.0, 0.0, 1000.0, 1.0, 0.0, 0.0, 0.0)
-"""Where an empty slot is: out of reach of everything."""
-
-
-class Obstacle(NamedTuple):
-    """Something that fills a slot."""
-
-    kind: str
-    """sphere, capsule, cylinder, ellipsoid or box."""
-    size: Sequence[float]
-    """As MuJoCo's: radius; radius and half length; half sides or semi-axes [m]."""
-    pose: Sequence[float]
-    """`[7]` position [m] and quaternion (w, x, y, z); a position alone is enough."""
+from jaxplan.scene.names import known
+from jaxplan.scene.numbers import rotations
 
 
 class World(NamedTuple):
@@ -39,13 +29,18 @@ class World(NamedTuple):
     held: jax.Array
     """`[..., n_objects]` bool: the object moves with the hand."""
     passive: jax.Array
-    """`[..., n_passive]` positions of the joints that are not the arm's (fingers) [m]."""
+    """`[..., n_passive]` positions of the joints that are not the arm's (fingers) and
+    follow none [rad or m]."""
     ignored: jax.Array
     """`[..., n_groups]` bool: contacts that this phase allows (`Scene.ignored`)."""
     slot_pose: jax.Array
     """`[..., n_slots, 7]` of the obstacles in the scene's slots."""
     slot_size: jax.Array
     """`[..., n_slots, 3]` their sizes as MuJoCo's [m]."""
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """A copy is in NumPy: so it can be read without JAX."""
+        return World, tuple(map(np.asarray, self))
 
 
 OWN_AXES = (2, 1, 1, 1, 2, 2)
@@ -57,7 +52,7 @@ def make_world(
     object_pose: npt.ArrayLike | None = None,
     held: npt.ArrayLike | None = None,
     passive: npt.ArrayLike | None = None,
-    ignored: Iterable[str] = (),
+    ignored: Iterable[str | tuple[str, str]] = (),
     obstacles: Iterable[Obstacle] = (),
 ) -> World:
     """A world; what is not given is as in the model's reference pose.
@@ -66,62 +61,110 @@ def make_world(
         scene: The scene.
         object_pose: `[..., n_objects, 7]`, see `World`.
         held: `[..., n_objects]` bool; none by default.
-        passive: `[..., n_passive]` [m].
-        ignored: Names of contact groups, such as "hand|mug".
+        passive: `[..., n_passive]` [rad or m].
+        ignored: Pairs of bodies that may touch, "hand|mug" or ("hand", "mug").
         obstacles: What fills the scene's slots, at most as many of a kind as there are.
 
     Raises:
-        ValueError: There is no slot of that kind left, or no such contact group; a mocap
-            body is held.
+        ValueError: There is no slot of that kind left, or no such pair; an obstacle makes
+            no sense; an array has the wrong shape; what is held is a mocap body, or the
+            arm hangs on it.
     """
+    refuse_fork()
+    check("scene", scene, Scene)
     if object_pose is None:
         poses = [_reference_pose(scene, name) for name in scene.objects]
         object_pose = np.array(poses).reshape(-1, 7)
     if held is None:
         held = np.zeros(len(scene.objects), bool)
-    if scene.mocap and np.any(np.asarray(held)[..., -len(scene.mocap) :]):
-        names = ", ".join(scene.mocap)
-        raise ValueError(
-            f"mocap bodies cannot be held, they have no free joint: {names}"
-        )
     if passive is None:
         passive = scene.mj_model.qpos0[scene.addresses(scene.passive)]
-    return World(
+    world = World(
         jnp.asarray(object_pose, jnp.float32),
         jnp.asarray(held, bool),
         jnp.asarray(passive, jnp.float32),
         jnp.asarray(scene.ignored(ignored)),
-        *_fill(scene, obstacles),
+        *fill(scene, obstacles),
     )
+    _refuse_shapes(scene, world)
+    if not isinstance(world.held, Tracer):
+        _refuse_held(scene, np.asarray(world.held))
+    return world
 
 
-def _fill(scene: Scene, obstacles: Iterable[Obstacle]) -> tuple[jax.Array, jax.Array]:
-    """`slot_pose` and `slot_size` with each obstacle in the first free slot of its kind."""
-    pose = np.tile(np.array(FAR, np.float32), (len(scene.slots), 1))
-    size = np.full((len(scene.slots), 3), 0.01, np.float32)
-    free: dict[str, list[int]] = {}
-    for index, slot in enumerate(scene.slots):
-        free.setdefault(slot.kind, []).append(index)
-    for obstacle in obstacles:
-        if not free.get(obstacle.kind):
+def world_at(
+    scene: Scene, qpos: np.ndarray, mocap: npt.ArrayLike | None = None
+) -> World:
+    """A world with passive joints and objects where MuJoCo has them.
+
+    Args:
+        scene: The scene.
+        qpos: `[nq]` MuJoCo's joint positions.
+        mocap: `[nmocap, 7]` poses of the mocap bodies, by mocap id; the model's where None.
+    """
+    poses = []
+    for name in scene.objects:
+        if name not in scene.mocap:
+            start = object_address(scene, name)
+            poses.append(qpos[start : start + 7])
+        elif mocap is None:
+            poses.append(_reference_pose(scene, name))
+        else:
+            own = scene.mj_model.body_mocapid[scene.body_id(name)]
+            poses.append(np.asarray(mocap, float)[own])
+    pose = np.array(poses, float).reshape(-1, 7)
+    pose[:, 3:] = rotations(pose[:, 3:])
+    return make_world(scene, pose, passive=qpos[scene.addresses(scene.passive)])
+
+
+def world_at_key(scene: Scene, key: str | int) -> World:
+    """A world as in a key frame of the model, its mocap bodies included.
+
+    Args:
+        scene: The scene.
+        key: Its name or id.
+
+    Raises:
+        ValueError: There is no such key frame.
+    """
+    model = scene.mj_model
+    names = [model.key(i).name for i in range(model.nkey)]
+    if isinstance(key, str):
+        key = names.index(known(key, "key frame", names))
+    elif not 0 <= key < model.nkey:
+        raise ValueError(f"no key frame {key}: the model has {model.nkey}")
+    poses = (model.key_mpos[key].reshape(-1, 3), model.key_mquat[key].reshape(-1, 4))
+    return world_at(scene, model.key_qpos[key], np.concatenate(poses, -1))
+
+
+def _refuse_shapes(scene: Scene, world: World) -> None:
+    """Names an array that does not fit the scene, and what its rows are for."""
+    expected = (
+        ("object_pose", world.object_pose, scene.objects, (7,)),
+        ("held", world.held, scene.objects, ()),
+        ("passive", world.passive, scene.passive, ()),
+    )
+    for field, leaf, names, row in expected:
+        own = (len(names), *row)
+        if leaf.shape[-len(own) :] != own:
+            wanted = ", ".join(map(str, ("...", *own)))
             raise ValueError(
-                f"no slot is left for a {obstacle.kind}: the scene has "
-                f"{sum(slot.kind == obstacle.kind for slot in scene.slots)} "
-                "(see `slots` of Scene.from_mjcf)"
+                f"{field} has shape {leaf.shape}, expected [{wanted}] for "
+                f"{', '.join(names) or 'nothing'}"
             )
-        if (
-            len(obstacle.pose) not in (3, 7)
-            or len(obstacle.size) != SIZES[obstacle.kind]
-        ):
+
+
+def _refuse_held(scene: Scene, held: np.ndarray) -> None:
+    """Names what cannot be in the hand."""
+    for name, taken in zip(scene.objects, np.moveaxis(held, -1, 0), strict=True):
+        if not taken.any():
+            continue
+        if name in scene.mocap:
             raise ValueError(
-                f"{obstacle}: expected {SIZES[obstacle.kind]} sizes and a pose of 3 or 7"
+                f"mocap bodies cannot be held, they have no free joint: {name}"
             )
-        index = free[obstacle.kind].pop(0)
-        pose[index, : len(obstacle.pose)] = obstacle.pose
-        size[index, : len(obstacle.size)] = obstacle.size
-        if len(obstacle.pose) == 3:
-            pose[index, 3:] = FAR[3:]
-    return jnp.asarray(pose), jnp.asarray(size)
+        if name in scene.bases:
+            raise ValueError(f"{name!r} cannot be held, the arm hangs on it")
 
 
 def batch_shape(world: World, q: jax.Array | np.ndarray) -> tuple[int, ...]:
@@ -141,6 +184,8 @@ def _reference_pose(scene: Scene, name: str) -> np.ndarray:
     """`[7]` of a movable object, as the model has it."""
     model, body = scene.mj_model, scene.body_id(name)
     if name in scene.mocap:
-        return np.concatenate([model.body_pos[body], model.body_quat[body]])
-    start = object_address(scene, name)
-    return model.qpos0[start : start + 7]
+        pose = np.concatenate([model.body_pos[body], model.body_quat[body]])
+    else:
+        start = object_address(scene, name)
+        pose = model.qpos0[start : start + 7]
+    return np.concatenate([pose[:3], rotations(pose[3:])])

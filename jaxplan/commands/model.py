@@ -1,13 +1,19 @@
 """A model and its poses as people name them on the command line."""
 
+from collections import Counter
+from collections.abc import Sequence
+from itertools import groupby
+from operator import itemgetter
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
-from jaxplan.collision import World, make_world
-from jaxplan.collision.world import object_address
+from jaxplan import collision
+from jaxplan.collision import World, world_at_key
+from jaxplan.collision.positions import couple
 from jaxplan.scene import Scene
+from jaxplan.scene.chain import simple_joints
 from jaxplan.scene.names import known
 
 
@@ -19,6 +25,8 @@ class Pose(NamedTuple):
     """`[d]` [rad or m]."""
     qpos: np.ndarray
     """`[nq]` all of the model's; as in the key frame or the reference pose."""
+    key: int | None = None
+    """The key frame's id."""
 
 
 def read_scene(path: Path, joints: str | None, hand: str | None) -> Scene:
@@ -52,10 +60,10 @@ def read_pose(scene: Scene, text: str, role: str) -> Pose:
                 f"{role}: no key frame {text!r}, the model has none; give {d} numbers"
             )
         try:
-            qpos = model.key(known(text, "key frame", keys)).qpos.copy()
+            key = model.key(known(text, "key frame", keys)).id
         except ValueError as error:
             raise ValueError(f"{role}: {error}") from None
-        return Pose(repr(text), qpos[scene.addresses(scene.joints)], qpos)
+        return _at_key(scene, key)
     if wrong := [part for part in parts if not _is_number(part)]:
         raise ValueError(f"{role}: {wrong[0]!r} is not a number")
     if len(parts) != d:
@@ -70,35 +78,59 @@ def read_pose(scene: Scene, text: str, role: str) -> Pose:
     return Pose(text, q, with_joints(scene, model.qpos0, q[None])[0])
 
 
+class Chain(NamedTuple):
+    """Joints one after the other, none of which has two after it but the last."""
+
+    body: str
+    """The first that moves."""
+    joints: list[str]
+
+
+def chains(scene: Scene, joints: Sequence[str]) -> list[Chain]:
+    """Joints by the chain of the kinematic tree that they are on, in their order."""
+    model, names = scene.mj_model, scene.structure.body_names
+    heads = [body for body in range(model.nbody) if simple_joints(model, body)]
+    above = {b: next((a for a in scene.line(b)[1:] if a in heads), 0) for b in heads}
+    branches = Counter(above.values())
+    first: dict[int, int] = {}
+    for body in heads:  # parents stand before children
+        up = above[body]
+        first[body] = first[up] if up and branches[up] == 1 else body
+    starts = [first[int(model.jnt_bodyid[scene.joint_id(name)])] for name in joints]
+    runs = groupby(zip(starts, joints, strict=True), key=itemgetter(0))
+    return [Chain(names[start], [name for _, name in run]) for start, run in runs]
+
+
 def default_pose(scene: Scene) -> Pose:
     """The key frame `home`, or the first one, or the reference pose."""
     model = scene.mj_model
     keys = [model.key(i).name for i in range(model.nkey)]
     if keys:
-        key = keys.index("home") if "home" in keys else 0
-        qpos = model.key(key).qpos.copy()
-        return Pose(repr(keys[key]), qpos[scene.addresses(scene.joints)], qpos)
+        return _at_key(scene, keys.index("home") if "home" in keys else 0)
     return Pose(
         "reference", model.qpos0[scene.addresses(scene.joints)], model.qpos0.copy()
     )
 
 
 def world_at(scene: Scene, pose: Pose) -> World:
-    """Fingers and objects where the pose has them."""
-    world = make_world(scene, passive=pose.qpos[scene.addresses(scene.passive)])
-    objects = np.array(world.object_pose)
-    for row, name in enumerate(scene.objects):
-        if name not in scene.mocap:
-            start = object_address(scene, name)
-            objects[row] = pose.qpos[start : start + 7]
-    return make_world(scene, objects, passive=world.passive)
+    """Fingers, objects and mocap bodies where the pose has them."""
+    if pose.key is not None:
+        return world_at_key(scene, pose.key)
+    return collision.world_at(scene, pose.qpos)
 
 
 def with_joints(scene: Scene, qpos: np.ndarray, q: np.ndarray) -> np.ndarray:
     """`[T, nq]`: `qpos [nq]` with the arm at `q [T, d]`."""
     rows = np.tile(qpos, (len(q), 1))
     rows[:, scene.addresses(scene.joints)] = q
+    couple(scene, rows)
     return rows
+
+
+def _at_key(scene: Scene, key: int) -> Pose:
+    found = scene.mj_model.key(key)
+    qpos = found.qpos.copy()
+    return Pose(repr(found.name), qpos[scene.addresses(scene.joints)], qpos, key)
 
 
 def _is_number(text: str) -> bool:

@@ -1,4 +1,4 @@
-"""What C MuJoCo says about planned paths and executed motions."""
+"""What `certify` says about planned paths and executed motions."""
 
 from collections import Counter
 
@@ -15,7 +15,7 @@ from jaxplan.scene import Scene
 class Certification:
     """Listens to the outer loop and certifies every path, and every motion before it runs.
 
-    The resolution is 0.01 rad; contacts deeper than 1 mm are refused.
+    Contacts deeper than 1 mm are refused.
 
     Args:
         planner: Whose paths are judged.
@@ -47,14 +47,8 @@ class Certification:
                 if len(waypoints) < 2:
                     continue
                 certificate = certify(self._scene, world, np.asarray(waypoints, float))
-                if not certificate.valid and certificate.pair is not None:
-                    pair, depth = (
-                        " and ".join(certificate.pair),
-                        -1000 * certificate.clearance,
-                    )
-                    said.append(
-                        f"phase {phase.number + 1}: {pair}, {depth:.1f} mm deep"
-                    )
+                if not certificate.valid:
+                    said.append(f"phase {phase.number + 1}: {certificate.reason}")
 
     def summary(self) -> dict:
         """Counts, and what was refused."""

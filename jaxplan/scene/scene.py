@@ -13,32 +13,23 @@ import dataclasses
 from collections.abc import Iterable, Mapping, Sequence
 from functools import partial
 from os import PathLike
-from typing import NamedTuple
+from typing import Any
 
 import jax
-import jax.numpy as jnp
 import mujoco
 import numpy as np
 
+from jaxplan.process import refuse_fork
 from jaxplan.scene.chain import line
 from jaxplan.scene.contacts import geom_pairs
-from jaxplan.scene.names import known
-from jaxplan.scene.source import SLOTS, compile_model
+from jaxplan.scene.excludes import ALWAYS, Exclude, Excluded
+from jaxplan.scene.limits import arm_limits, circular, rates
+from jaxplan.scene.names import geom_name, known, pair_of, shortened
+from jaxplan.scene.numbers import Numbers, read_numbers
+from jaxplan.scene.source import SLOTS, check_arguments, compile_model
+from jaxplan.scene.srdf import read_srdf
 from jaxplan.scene.structure import Group, Slot, Structure, read_structure
-
-
-class Numbers(NamedTuple):
-    """The arrays of an `MjModel` that planning reads, under MuJoCo's names and shapes."""
-
-    body_pos: jax.Array
-    body_quat: jax.Array
-    geom_pos: jax.Array
-    geom_quat: jax.Array
-    geom_size: jax.Array
-    jnt_pos: jax.Array
-    jnt_axis: jax.Array
-    jnt_range: jax.Array
-    qpos0: jax.Array
+from jaxplan.scene.urdf import read_urdf
 
 
 @partial(
@@ -46,12 +37,17 @@ class Numbers(NamedTuple):
     data_fields=["model"],
     meta_fields=["structure"],
 )
-@dataclasses.dataclass(frozen=True, eq=False)
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class Scene:
     """A pytree: the numbers are its data, the structure is static."""
 
     model: Numbers
     structure: Structure
+
+    def __getstate__(self) -> dict[str, Any]:
+        """A copy has its numbers in NumPy: so it can be read without JAX."""
+        numbers = Numbers(*map(np.asarray, self.model))  # type: ignore[arg-type]
+        return {"model": numbers, "structure": self.structure}
 
     @classmethod
     def from_mjcf(
@@ -60,47 +56,95 @@ class Scene:
         joints: Sequence[str] | None = None,
         hand: str | None = None,
         slots: Mapping[str, int] | None = None,
+        exclude: Exclude = ALWAYS,
     ) -> "Scene":
         """Reads a scene.
 
         Args:
-            source: An MJCF's path or text, an `MjSpec` or an `MjModel`.
+            source: An MJCF's path or text, a URDF's path, an `MjSpec` or an `MjModel`.
             joints: The arm's joints in the order of q. None: all hinge and slide joints
                 that are not the gripper's, on the longest way down from the world. It
                 ends where the tree branches into parts with no more joints than stand
                 above (fingers), and before joints at the very end that are called
-                gripper, finger or jaw.
+                gripper, finger or jaw; it begins after those that drive a base over the
+                floor. Joints that follow others by an <equality><joint> are none of the
+                arm's, unless those can follow them.
             hand: The body that carries what is held. None: the last body before another
                 joint or a branch follows, from that of the last of `joints` on.
             slots: Room for obstacles that change between queries: how many of each kind
                 (sphere, capsule, cylinder, ellipsoid, box), such as `{"box": 16}`. They
                 can touch whatever can touch anything.
+            exclude: Contacts to leave out, besides the model's own: "always_touching", for
+                geoms that overlap wherever the arm is (neighbouring links, often; never
+                objects and slots); pairs of bodies, ("hand", "mug") or "hand|mug"; a list
+                of both; or None. `excluded` says which.
 
         Raises:
             FileNotFoundError: There is no such file.
             ValueError: The file is no valid model, or a number in it is not finite; a
                 joint or body is not in it, or cannot be planned for; `joints` is None
                 and several chains are longest; a geom that can touch the arm is a height
-                field, a flex or an SDF.
+                field, a flex or an SDF; the arm's joints are tied by a loop or a tendon,
+                or leave no values to joints that follow them.
         """
+        refuse_fork()
+        check_arguments(source, joints, hand, slots)
         slots = slots or {}
         model = compile_model(source, slots)
-        numbers = Numbers(*(jnp.asarray(getattr(model, f)) for f in Numbers._fields))
         names = SLOTS if any(slots.values()) else None
-        return cls(numbers, read_structure(model, joints, hand, names))
+        structure = read_structure(model, joints, hand, names, exclude)
+        numbers = read_numbers(model)
+        arm_limits(structure, numbers)  # raises where a joint has no room
+        return cls(numbers, structure)
+
+    @classmethod
+    def from_urdf(
+        cls,
+        path: str | PathLike,
+        srdf: str | PathLike | None = None,
+        joints: str | Sequence[str] | None = None,
+        hand: str | None = None,
+        slots: Mapping[str, int] | None = None,
+        exclude: Exclude = ALWAYS,
+        meshes: str | PathLike | None = None,
+    ) -> "Scene":
+        """Reads a robot as ROS has it: its collision shapes, with its root link fixed.
+
+        Args:
+            path: Of the URDF.
+            srdf: Of the SRDF: links whose collisions it disables are left out.
+            joints: As for `from_mjcf`, or the name of a group in the SRDF.
+            hand: See `from_mjcf`.
+            slots: See `from_mjcf`.
+            exclude: See `from_mjcf`.
+            meshes: Folder of packages or meshes; None: the URDF's own, and all above it.
+
+        Raises:
+            FileNotFoundError: There is no such file, or a mesh that is not found.
+            ValueError: As for `from_mjcf`; no such group; a mesh that MuJoCo cannot read.
+        """
+        spec = read_urdf(path, meshes)
+        disabled, groups = ((), {}) if srdf is None else read_srdf(srdf, spec)
+        if isinstance(joints, str):
+            joints = groups[known(joints, "group", list(groups))]
+        given = [exclude] if isinstance(exclude, str) else exclude or ()
+        return cls.from_mjcf(spec, joints, hand, slots, [*given, *disabled])
 
     def replace(self, **fields: jax.Array) -> "Scene":
         """The scene with some of its `Numbers` replaced, e.g. `geom_pos`.
 
         No recompilation follows, except from `geom_quat`: which boxes are parallel is
-        structure, so that field must be concrete and gives a new structure.
+        structure, so that field must be concrete and gives a new structure. So it is with
+        `jnt_range` and `qpos0` where joints follow others, for how fast they do.
         """
         structure = self.structure
-        if "geom_quat" in fields:
-            turned = copy.copy(self.mj_model)
-            turned.geom_quat[:] = np.asarray(fields["geom_quat"])
-            slots = SLOTS if self.slots else None
-            structure = read_structure(turned, self.joints, self.hand, slots)
+        follows = ("jnt_range", "qpos0") if structure.dependent else ()
+        if changed := fields.keys() & {"geom_quat", *follows}:
+            model = copy.copy(self.mj_model)
+            for name in changed:
+                getattr(model, name)[:] = np.asarray(fields[name])
+            names = self.joints, self.hand, SLOTS if self.slots else None
+            structure = read_structure(model, *names, structure.excludes)
         return Scene(self.model._replace(**fields), structure)
 
     @property
@@ -119,6 +163,13 @@ class Scene:
         return self.structure.passive
 
     @property
+    def dependent(self) -> tuple[str, ...]:
+        """Joints that follow the arm's or passive ones by an <equality><joint>."""
+        return tuple(
+            self.structure.joint_names[d.joint] for d in self.structure.dependent
+        )
+
+    @property
     def objects(self) -> tuple[str, ...]:
         """Bodies with a free joint, then mocap bodies: `World.object_pose` places them."""
         return self.structure.objects
@@ -127,6 +178,13 @@ class Scene:
     def mocap(self) -> tuple[str, ...]:
         """Mocap bodies, the last of the objects: they can be placed but not held."""
         return self.structure.mocap
+
+    @property
+    def bases(self) -> tuple[str, ...]:
+        """Objects on which the arm hangs: they stand where they are placed, never held."""
+        bodies = self.structure.moved | {self.body_id(self.hand)}
+        above = {body for moved in bodies for body in self.line(moved)}
+        return tuple(name for name in self.objects if self.body_id(name) in above)
 
     @property
     def slots(self) -> tuple[Slot, ...]:
@@ -144,19 +202,40 @@ class Scene:
         return self.structure.groups
 
     @property
+    def excluded(self) -> tuple[Excluded, ...]:
+        """Contacts that are left out besides the model's own, and why."""
+        return self.structure.excludes.rows
+
+    @property
     def q_min(self) -> jax.Array:
-        """`[d]` lower joint limits [rad or m]; -inf where a joint has none."""
-        return self._limits(0, -jnp.inf)
+        """`[d]` lower joint limits [rad or m]; -inf where a joint has none.
+
+        Within them, all joints that follow the arm's are inside their own limits.
+        """
+        return arm_limits(self.structure, self.model)[0]
 
     @property
     def q_max(self) -> jax.Array:
         """`[d]` upper joint limits [rad or m]; inf where a joint has none."""
-        return self._limits(1, jnp.inf)
+        return arm_limits(self.structure, self.model)[1]
 
-    def _limits(self, side: int, unlimited: float) -> jax.Array:
-        ids = np.array([self.joint_id(name) for name in self.joints])
-        limited = self.mj_model.jnt_limited[ids] != 0
-        return jnp.where(limited, self.model.jnt_range[ids, side], unlimited)
+    @property
+    def circular(self) -> np.ndarray:
+        """`[d]` bool: joints that come back to where they were after a full turn.
+
+        These are hinges without limits, their own or those of joints that follow them,
+        provided that what follows them comes back too. If it does not (a gear of 2 : 5, a
+        spindle), each value of the joint is another configuration, on a line without ends.
+        """
+        return circular(self.structure)
+
+    @property
+    def rates(self) -> np.ndarray:
+        """`[n, d]` how far each joint moves at most while one of the arm's moves by 1.
+
+        Of all hinges and slides (`Structure.variables`), within the limits.
+        """
+        return rates(self.structure)
 
     def joint_id(self, name: str) -> int:
         """MuJoCo's id of a joint; joints without a name are called joint4, after theirs."""
@@ -173,12 +252,6 @@ class Scene:
         ids = [self.joint_id(name) for name in joints]
         return self.mj_model.jnt_qposadr[np.array(ids, int)]
 
-    @property
-    def arm_bodies(self) -> set[int]:
-        """Ids of the bodies on which the arm's joints are."""
-        ids = [self.joint_id(name) for name in self.joints]
-        return {int(body) for body in self.mj_model.jnt_bodyid[ids]}
-
     def line(self, body: int) -> list[int]:
         """Ids of the body, its parent and so on, without the world."""
         return line(self.mj_model, body)
@@ -188,21 +261,25 @@ class Scene:
         kind = self.mj_model.jnt_type[self.joint_id(name)]
         return "slide" if kind == mujoco.mjtJoint.mjJNT_SLIDE else "hinge"
 
-    def ignored(self, names: Iterable[str]) -> np.ndarray:
+    def ignored(self, names: Iterable[str | tuple[str, str]]) -> np.ndarray:
         """`[n_groups]` mask of contact groups, for `World.ignored`.
 
         Args:
-            names: Pairs of bodies, "hand|mug" or "mug|hand"; geoms that hang on no
-                body of their own belong to "world".
+            names: Pairs of bodies, "hand|mug" or ("hand", "mug") in either order; geoms
+                that hang on no body of their own belong to "world". Pairs that are not
+                checked anyway may be named.
 
         Raises:
-            ValueError: There is no such group.
+            ValueError: There is no such body.
         """
-        every = [group.name for group in self.groups]
-        mask = np.zeros(len(every), bool)
+        bodies = self.structure.body_names
+        groups = [
+            {bodies[side.body] for side in group.contacts[0]} for group in self.groups
+        ]
+        mask = np.zeros(len(groups), bool)
         for name in names:
-            ordered = "|".join(sorted(name.split("|")))
-            mask[every.index(known(ordered, "contact group", every))] = True
+            pair = set(pair_of(name, bodies, [group.name for group in self.groups]))
+            mask |= [pair == group for group in groups]
         return mask
 
     @property
@@ -226,7 +303,10 @@ class Scene:
 
     def geom_name(self, geom: int) -> str:
         """A geom's name; body[number] where it has none."""
-        model = self.mj_model
-        body = model.geom_bodyid[geom]
-        number = geom - model.body_geomadr[body]
-        return model.geom(geom).name or f"{self.structure.body_names[body]}[{number}]"
+        return geom_name(self.mj_model, self.structure.body_names, geom)
+
+    def __repr__(self) -> str:
+        return (
+            f"Scene(joints: {shortened(self.joints)}; objects: {shortened(self.objects)}; "
+            f"{len(self.pairs)} pairs; {len(self.slots)} slots)"
+        )

@@ -2,14 +2,26 @@
 
 import dataclasses
 from collections.abc import Sequence
+from functools import cached_property
 from typing import NamedTuple
 
 import mujoco
 import numpy as np
 
-from jaxplan.scene.chain import SIMPLE_JOINTS, arm_joints, last_body, line
-from jaxplan.scene.contacts import Contact, find_contacts, kind_of
+from jaxplan.scene.chain import SIMPLE_JOINTS, last_body, line, read_arm
+from jaxplan.scene.contacts import (
+    Contact,
+    find_contacts,
+    geom_pairs,
+    kind_of,
+    refuse_unsupported,
+)
+from jaxplan.scene.dependent import Dependent, in_order, root_of
+from jaxplan.scene.excludes import Exclude, Excludes, find_excludes
+from jaxplan.scene.flexes import refuse_flexes
+from jaxplan.scene.loops import refuse_loops
 from jaxplan.scene.names import known, names_of
+from jaxplan.scene.touching import Motion, near_distances
 
 
 class Link(NamedTuple):
@@ -27,7 +39,7 @@ class Link(NamedTuple):
     """Joint id, or -1."""
     slides: bool
     variable: int
-    """Its joint's index in (q, passive joints), or -1."""
+    """Its joint's index in `Structure.variables`, or -1."""
     object: int
     """Its index in the movable objects, or -1."""
 
@@ -36,6 +48,7 @@ class Group(NamedTuple):
     """All contacts between two bodies: the unit that a phase allows or forbids."""
 
     name: str
+    """Both bodies with | between them, in the order of the alphabet."""
     contacts: tuple[Contact, ...]
     held: tuple[int, ...]
     """Objects of which one must be held for the contact to depend on q; () = always."""
@@ -48,7 +61,7 @@ class Slot(NamedTuple):
     kind: str
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class Structure:
     """What does not change when a geom moves. Compared by identity, so cheap under jit."""
 
@@ -59,17 +72,36 @@ class Structure:
     """By joint id; joint4 likewise."""
     joints: tuple[str, ...]
     passive: tuple[str, ...]
+    dependent: tuple[Dependent, ...]
+    """Joints that follow others, each after its master."""
+    variables: tuple[int, ...]
+    """Joint ids: the arm's, the passive ones, then the dependent ones."""
+    moved: frozenset[int]
+    """Ids of the bodies that the arm's joints, and those that follow them, move first."""
     objects: tuple[str, ...]
     mocap: tuple[str, ...]
     """The last of the objects: those without a free joint."""
     hand: str
     slots: tuple[Slot, ...]
     groups: tuple[Group, ...]
+    excludes: Excludes
     links: tuple[Link, ...]
     """Links that collision needs, row 1 first (row 0 is the world). Parents stand before
-    children, then the movable objects, which the hand may hold, then what hangs on them."""
+    children: first the fixed trees and the hand's, then the movable objects, which the
+    hand may hold, then what hangs on them."""
     link_of: dict[int, int]
     """Row of a body's frame, by body id."""
+
+    @cached_property
+    def near(self) -> dict[tuple[int, int], float]:
+        """Geoms `(i, j)`, i < j, of neighbours that are hardly ever farther apart than so [m].
+
+        A margin at least as large counts as none for them: no pose keeps it.
+        """
+        groups = (group for group in self.groups if not group.held)
+        pairs = [p for group in groups for c in group.contacts for p in geom_pairs(c)]
+        motion = Motion(self.moved, self.variables, self.dependent)
+        return near_distances(self.mj_model, motion, pairs)
 
 
 def read_structure(
@@ -77,6 +109,7 @@ def read_structure(
     joints: Sequence[str] | None,
     hand: str | None,
     slots: str | None = None,
+    exclude: Exclude | Excludes = None,
 ) -> Structure:
     """Reads names, tree and contacts; `Scene.from_mjcf` says what None means.
 
@@ -85,47 +118,51 @@ def read_structure(
         joints: The arm's.
         hand: A body.
         slots: The body whose geoms are slots.
+        exclude: Contacts to leave out, or what was found to be left out.
 
     Raises:
         ValueError: A joint or body is not in the model, or cannot be planned for.
     """
-    if model.nflex:
-        raise ValueError("flexes are not supported: the model has a deformable body")
     bodies, every = names_of(model, "body"), names_of(model, "joint")
-    joints = arm_joints(model, every) if joints is None else tuple(joints)
-    if not joints:
-        raise ValueError("the model has no hinge or slide joint to plan for")
-    arm = [every.index(known(name, "joint", every)) for name in joints]
-    for name, joint in zip(joints, arm, strict=True):
-        if model.jnt_type[joint] not in SIMPLE_JOINTS:
-            raise ValueError(f"joint {name!r} is neither a hinge nor a slide")
-        if arm.count(joint) > 1:
-            raise ValueError(f"joint {name!r} is given twice")
-    moved = {int(body) for body in model.jnt_bodyid[arm]}
-    end = last_body(model, int(model.jnt_bodyid[arm[-1]]))
+    arm, drives = read_arm(model, every, joints)
+    passive = [
+        j
+        for j, kind in enumerate(model.jnt_type)
+        if kind in SIMPLE_JOINTS and j not in arm and j not in drives
+    ]
+    dependent = in_order(drives, [*arm, *passive])
+    variables = (*arm, *passive, *(joint for joint, *_ in dependent))
+    following = [j for j in drives if root_of(drives, j) in arm]
+    moving = [*arm, *following]
+    moved = frozenset(int(body) for body in model.jnt_bodyid[moving])
+    end = last_body(model, int(model.jnt_bodyid[arm[-1]]), following)
     hand = known(bodies[end] if hand is None else hand, "body", bodies)
-    passive = tuple(
-        name
-        for name, kind in zip(every, model.jnt_type, strict=True)
-        if kind in SIMPLE_JOINTS and name not in joints
-    )
     free = [
         int(b) for b in model.jnt_bodyid[model.jnt_type == mujoco.mjtJoint.mjJNT_FREE]
     ]
     mocap = [int(b) for b in np.flatnonzero(model.body_mocapid >= 0)]
-    groups = _groups(model, bodies, moved, free)
+    refuse_loops(model, bodies, moving)
+    refuse_flexes(model, moved | set(free))
+    if not isinstance(exclude, Excludes):
+        apart = [*free, *mocap, *([bodies.index(slots)] if slots else ())]
+        motion = Motion(moved, variables, dependent)
+        exclude = find_excludes(model, bodies, motion, apart, exclude)
+    groups = _groups(model, bodies, moved, free, exclude)
     needed = {bodies.index(hand)}
     for group in groups:
         needed |= {side.body for contact in group.contacts for side in contact}
     needed = {a for body in needed for a in line(model, body)}
-    variables = [every.index(name) for name in (*joints, *passive)]
-    links, link_of = _links(model, needed, every, variables, [*free, *mocap])
+    base = int(model.body_rootid[bodies.index(hand)])
+    links, link_of = _links(model, needed, every, variables, [*free, *mocap], base)
     return Structure(
         mj_model=model,
         body_names=bodies,
         joint_names=every,
-        joints=joints,
-        passive=passive,
+        joints=tuple(every[j] for j in arm),
+        passive=tuple(every[j] for j in passive),
+        dependent=dependent,
+        variables=variables,
+        moved=moved,
         objects=tuple(bodies[b] for b in (*free, *mocap)),
         mocap=tuple(bodies[b] for b in mocap),
         hand=hand,
@@ -135,59 +172,88 @@ def read_structure(
             if bodies[body] == slots
         ),
         groups=groups,
+        excludes=exclude,
         links=links,
         link_of=link_of,
     )
 
 
+def only_line(structure: Structure, body: int) -> Structure:
+    """The structure with the links of one body's line only.
+
+    Where the hand may hold what the body hangs on, the hand's line is there too.
+    """
+    model, bodies = structure.mj_model, structure.body_names
+    hand = bodies.index(structure.hand)
+    objects = [bodies.index(name) for name in structure.objects]
+    needed = set(line(model, body))
+    if needed & set(objects):
+        needed |= set(line(model, hand))
+    links, link_of = _links(
+        model,
+        needed,
+        structure.joint_names,
+        structure.variables,
+        objects,
+        int(model.body_rootid[hand]),
+    )
+    return dataclasses.replace(structure, links=links, link_of=link_of)
+
+
+def movers(structure: Structure, body: int) -> np.ndarray:
+    """`[d]` bool: joints of the arm that move a body, by themselves or what follows them."""
+    model = structure.mj_model
+    above = np.isin(model.jnt_bodyid[list(structure.variables)], line(model, body))
+    first = len(structure.variables) - len(structure.dependent)
+    followers = list(enumerate(structure.dependent, first))
+    for own, (_, master, _) in reversed(followers):
+        if master >= 0:
+            above[master] |= above[own]
+    return above[: len(structure.joints)]
+
+
 def _groups(
-    model: mujoco.MjModel, names: tuple[str, ...], arm: set[int], free: list[int]
+    model: mujoco.MjModel,
+    names: tuple[str, ...],
+    arm: frozenset[int],
+    free: list[int],
+    excludes: Excludes,
 ) -> tuple[Group, ...]:
     """Contacts by pair of bodies.
 
     A contact that q cannot change (a free object on the table) counts only while one
-    of its objects is held; without an object it never counts.
+    of its objects is held; what moves both bodies alike (the arm two fingers) changes none.
 
     Args:
         model: The model.
         names: Of bodies, by id.
         arm: Bodies that the arm's joints move first.
         free: Bodies with a free joint: objects that can be held.
+        excludes: What is left out.
     """
-    named: dict[str, list[Contact]] = {}
-    for contact in find_contacts(model):
-        name = "|".join(sorted(names[side.body] for side in contact))
-        named.setdefault(name, []).append(contact)
+    between: dict[tuple[int, int], list[Contact]] = {}
+    for contact in find_contacts(model, excludes.geoms):
+        first, second = sorted(side.body for side in contact)
+        between.setdefault((first, second), []).append(contact)
     groups = []
-    for name, contacts in named.items():
-        lines = [line(model, side.body) for side in contacts[0]]
-        moved = any(arm & set(above) for above in lines)
-        roots = [above[-1] for above in lines if above]
-        held = tuple(free.index(root) for root in roots if root in free)
-        if moved or held:
-            _refuse_unsupported(model, contacts)
-            groups.append(Group(name, tuple(contacts), () if moved else held))
+    for pair, contacts in between.items():
+        lines = [line(model, body) for body in pair]
+        apart = set(lines[0]) ^ set(lines[1])
+        held = tuple(free.index(body) for body in free if body in apart)
+        if arm & apart or held:
+            refuse_unsupported(model, contacts)
+            name = "|".join(sorted(names[body] for body in pair))
+            groups.append(Group(name, tuple(contacts), () if arm & apart else held))
     return tuple(groups)
-
-
-def _refuse_unsupported(model: mujoco.MjModel, contacts: list[Contact]) -> None:
-    """Names a geom that planning cannot check, rather than to look past it."""
-    for side in (side for contact in contacts for side in contact):
-        if side.kind in ("hfield", "sdf"):
-            name = model.geom(side.ids[0]).name or f"geom {side.ids[0]}"
-            long = {"hfield": "a height field", "sdf": "a signed distance field"}
-            raise ValueError(
-                f"{name!r} is {long[side.kind]}, which is not supported: use a mesh or "
-                "boxes, or set its contype and conaffinity to 0"
-            )
 
 
 def _links(
     model: mujoco.MjModel,
     needed: set[int],
     names: tuple[str, ...],
-    variables: list[int],
+    variables: Sequence[int],
     objects: list[int],
+    base: int,
 ) -> tuple[tuple[Link, ...], dict[int, int]]:
     """Links of the bodies that are needed, and the row of each body.
 
@@ -195,11 +261,13 @@ def _links(
         model: The model.
         needed: Bodies, with all above them.
         names: Of joints, by id.
-        variables: Ids of the arm's joints, then of the passive ones.
+        variables: Ids of joints, as `Structure.variables`.
         objects: Bodies of the movable objects.
+        base: The root of the hand's tree, perhaps one of them: it is never held.
     """
     free = {body: i for i, body in enumerate(objects)}
-    rank = {b: 1 if b in free else 2 * (model.body_rootid[b] in free) for b in needed}
+    hung = {b for b in needed if model.body_rootid[b] in free.keys() - {base}}
+    rank = {b: (b in hung) + (b in hung and b not in free) for b in needed}
     links: list[Link] = []
     row = {0: 0}
     for body in sorted(needed, key=lambda b: (rank[b], b)):
