@@ -1,7 +1,10 @@
 """The fast backend against C MuJoCo, `mjx.collision` and its own laws."""
 
+import copy
+
 import jax
 import jax.numpy as jnp
+import mujoco
 import numpy as np
 import pytest
 from mug_worlds import random_world
@@ -15,6 +18,7 @@ from jaxplan.collision import (
     make_world,
     motion_free,
     points_for,
+    required_clearances,
 )
 from jaxplan.scene import Scene
 from jaxplan.tasks.mug.scene import Q_HOME, build
@@ -28,7 +32,7 @@ def scene() -> Scene:
 
 
 fast_clearance = jax.jit(clearance, compiler_options=XLA_OPTIONS)
-fast_free = jax.jit(config_free, compiler_options=XLA_OPTIONS)
+fast_free = jax.jit(config_free, static_argnums=4, compiler_options=XLA_OPTIONS)
 
 
 def uniform(scene: Scene, rng: np.random.Generator, rows: int) -> np.ndarray:
@@ -241,3 +245,68 @@ def test_both_backends_give_the_same_verdict_on_the_mug_scene(scene: Scene):
     distance = np.asarray(fast_clearance(scene, world, q))
     clear = np.abs(distance) > BAND
     np.testing.assert_array_equal((distance > 0)[clear], (reference > 0)[clear])
+
+
+MARGINS = """
+<mujoco><compiler angle="radian"/><worldbody>
+  <geom name="floor" type="plane" size="1 1 1" pos="0 0 -.4" margin=".02"/>
+  <geom name="ball" size=".1" pos=".5 0 0" margin=".01" gap=".05"/>
+  <geom name="ball2" size=".1" pos="-.5 0 0"/>
+  <geom name="wall" type="box" size=".1 .1 .1" pos="0 .5 0" margin=".03"/>
+  <geom name="rod" type="capsule" size=".05 .1" pos="0 -.5 0"/>
+  <body name="arm"><joint name="a" axis="0 0 1" range="-3 3"/>
+    <joint name="b" axis="0 1 0" range="-1 1"/>
+    <geom name="tip" size=".05" pos=".36 0 0" margin=".015"/>
+    <geom name="tail" type="capsule" size=".05 .1" pos="-.24 0 .1" gap=".01"/></body>
+</worldbody>
+<contact><pair geom1="tip" geom2="wall" margin=".05" gap=".02"/></contact></mujoco>"""
+
+
+@pytest.mark.parametrize("override", [False, True])
+def test_the_margins_of_the_model_count_as_in_mujoco(override: bool):
+    flag = '<option o_margin=".04"><flag override="enable"/></option>' * override
+    scene = Scene.from_mjcf(MARGINS.replace("<worldbody>", flag + "<worldbody>", 1))
+    model, world = scene.mj_model, make_world(scene)
+    data, q = mujoco.MjData(model), uniform(scene, np.random.default_rng(8), 600)
+    free, near = [], []
+    for row in q:
+        data.qpos[:] = row
+        mujoco.mj_kinematics(model, data)
+        mujoco.mj_collision(model, data)
+        beyond = data.contact.dist - data.contact.includemargin
+        free.append(not (beyond < 0).any())
+        near.append((np.abs(beyond) < 1e-5).any())
+    ours = np.asarray(fast_free(scene, world, q))
+    assert 0.1 < np.mean(free) < 0.9
+    np.testing.assert_array_equal(
+        ours[~np.array(near)], np.array(free)[~np.array(near)]
+    )
+    distance = np.asarray(fast_clearance(scene, world, q))
+    assert (~ours & (distance > 0.01)).any()
+    wide = np.asarray(fast_free(scene, world, q, 0.08))
+    clear = np.abs(distance - 0.08) > 1e-5
+    np.testing.assert_array_equal(wide[clear], (distance > 0.08)[clear])
+    table = np.asarray(required_clearances(scene))
+    tip, ball, wall = (scene.mj_model.geom(n).id for n in ("tip", "ball", "wall"))
+    expected = [0.04, 0.04] if override else [0.025, 0.05]
+    np.testing.assert_allclose(table[[tip, tip], [ball, wall]], expected, rtol=1e-6)
+
+
+def test_pairs_that_are_always_near_keep_no_margin_beyond_it():
+    scene = Scene.from_mjcf(SMALL)
+    model, world = scene.mj_model, make_world(scene)
+    tip, wall, floor = (model.geom(name).id for name in ("tip", "wall", "floor"))
+    structure = copy.copy(scene.structure)
+    object.__setattr__(structure, "near", {(wall, tip): 0.06, (tip, floor): 0.5})
+    known = Scene(scene.model, structure)
+    q = np.linspace(-3, 3, 400)[:, None]
+    distance = np.asarray(fast_clearance(scene, world, q))
+    for margin, counts in ((0.05, True), (0.07, False)):
+        free = np.asarray(fast_free(known, world, q, margin))
+        plain = np.asarray(fast_free(scene, world, q, margin))
+        assert (free == plain).all() == counts
+        assert (free >= plain).all()
+        assert not free[distance < 0].any()
+    swept = np.asarray(fast_free(known, world, q, 0.07, "fast", 0 * q + 0.1))
+    assert (swept <= free).all()
+    assert swept.sum() < free.sum()

@@ -73,15 +73,18 @@ def pair_reaches(scene: Scene, world: World) -> np.ndarray:
     """
     table = np.zeros(2 * (scene.mj_model.ngeom,) + (len(scene.joints),))
     pairs = np.array([pair for _, pair in _pairs(scene)], int).reshape(-1, 2)
-    table[*pairs.T] = table[*pairs.T[::-1]] = np.asarray(_reaches(scene, world))
+    limits = scene.q_min, scene.q_max
+    table[*pairs.T] = table[*pairs.T[::-1]] = np.asarray(_reaches(scene, world, limits))
     return table
 
 
 @partial(jax.jit, compiler_options=XLA_OPTIONS)
-def _reaches(scene: Scene, world: World) -> jax.Array:
+def _reaches(
+    scene: Scene, world: World, limits: tuple[jax.Array, jax.Array]
+) -> jax.Array:
     """`[n_pairs, d]`, as `_pairs` orders them."""
     ways, pairs = find_ways(scene), _pairs(scene)
-    travel, extent = _anywhere(scene, world, ways, None)
+    travel, extent = _anywhere(scene, world, ways, limits)
     reach = jnp.zeros((len(pairs), len(scene.joints), 1))
     if not pairs:
         return reach[..., 0]

@@ -4,20 +4,26 @@ Written for XLA on CPU: batch last, a block small enough for the cache, a runnin
 minimum instead of boolean reductions (performance: 10x over the plain form).
 """
 
-from collections import defaultdict
 from collections.abc import Callable, Sequence
 from functools import reduce
-from typing import Any, NamedTuple
+from typing import Any
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 
 from jaxplan.collision.convex import least_convex
+from jaxplan.collision.fronts import (
+    Front,
+    find_convex_pairs,
+    find_fronts,
+)
 from jaxplan.collision.kinematics import link_poses, rotation_of
+from jaxplan.collision.margins import Rule, required
 from jaxplan.collision.narrow import CLOSED
 from jaxplan.collision.reach import (
     Extent,
+    Ways,
     extents,
     find_ways,
     moved_by,
@@ -32,37 +38,13 @@ from jaxplan.collision.shapes import (
     smaller,
 )
 from jaxplan.collision.world import World
-from jaxplan.scene import Geoms, Scene, geom_pairs
+from jaxplan.scene import Scene
 
 XLA_OPTIONS: dict[str, str | bool] = {"xla_cpu_use_fusion_emitters": False}
 """Compiler options for the outermost `jax.jit` of anything that checks collisions: with
 XLA's CPU fusion emitters, kinematic chains are recomputed for every use (100x slower)."""
 
 BLOCK = 256
-
-
-class Front(NamedTuple):
-    """Geoms of several bodies that face the same obstacles, all of one body."""
-
-    facing: tuple[int, ...]
-    """Geom ids."""
-    links: tuple[int, ...]
-    """Kinematic link of each."""
-    groups: tuple[int, ...]
-    """Contact group of each."""
-    obstacles: tuple[Geoms, ...]
-    kinds: tuple[str, str]
-
-
-class ConvexPairs(NamedTuple):
-    """Pairs of geoms whose distance has no closed form."""
-
-    geoms: dict[tuple[str, bool], tuple[int, ...]]
-    """Their ids, by kind and whether they are in slots."""
-    pairs: tuple[tuple[int, int], ...]
-    """Geom ids."""
-    groups: tuple[int, ...]
-    """Contact group of each pair."""
 
 
 def least_scores(
@@ -87,7 +69,7 @@ def least_scores(
     """
     if not scene.groups:
         return jnp.full(q.shape[-1], jnp.inf, q.dtype)
-    fronts, pairs = _fronts(scene), _convex_pairs(scene)
+    fronts, pairs = find_fronts(scene), find_convex_pairs(scene)
     slots = {slot.geom: index for index, slot in enumerate(scene.slots)}
 
     def shapes(ids: tuple[int, ...], world: World) -> Shapes:
@@ -103,7 +85,11 @@ def least_scores(
             return _least_over_slots(function, own, world, rows, score)
         frame = poses[scene.structure.link_of[front.obstacles[0].body]]
         near = seen_from(own, frame)
-        rated = [function(near, shapes(o.ids, world), score) for o in front.obstacles]
+        rated, first = [], 0
+        for o in front.obstacles:
+            own = score.among(first, len(o.ids))
+            rated.append(function(near, shapes(o.ids, world), own))
+            first += len(o.ids)
         return reduce(smaller, rated)
 
     def convex(
@@ -131,37 +117,51 @@ def least_scores(
         if motion is not None:
             travel = travel_from(scene, world, ways, poses, motion)
 
-        def swept(groups: tuple[int, ...], *sides: Sequence[Sequence[int]]) -> Score:
+        def nearer(
+            groups: Sequence[int], *sides: Sequence[Sequence[int]]
+        ) -> jax.Array | float:
             if travel is None or extent is None:
-                return score
-            nearer = [
+                return 0.0
+            return sum(
                 moved_by(travel, ways.of_geoms(scene, groups, side), extent.of(side))
                 for side in sides
-            ]
-            return score._replace(margin=score.margin + sum(nearer))
+            )
 
         least = []
         for front in fronts:
             obstacles = [geom for o in front.obstacles for geom in o.ids]
             facing = [(geom,) for geom in front.facing]
-            own = swept(front.groups, facing, [obstacles])
-            rated = scores(front, poses, world, own)
+            closer = nearer(front.groups, facing, [obstacles])
+            margins = _margins(front.rules, score, closer)
+            rated = scores(front, poses, world, score._replace(margin=margins))
             rated = jnp.where(counts[np.array(front.groups)], rated, jnp.inf)
             least.append(jnp.min(rated, 0))
         if pairs.pairs:
             sides = (
                 [(geom,) for geom in side] for side in zip(*pairs.pairs, strict=True)
             )
-            own = swept(pairs.groups, *sides)
-            least.append(convex(poses, world, counts, own))
+            closer = nearer(pairs.groups, *sides)
+            (margins,) = _margins([pairs.rules], score, closer)
+            rated = score._replace(margin=margins)
+            least.append(convex(poses, world, counts, rated))
         return reduce(smaller, least)
 
-    ways, extent = find_ways(scene), None
+    ways, extent = Ways((), {}), None
     if motion is not None:
         width = max(leaf.shape[-1] for leaf in world)
         anywhere = jnp.zeros((len(q), width), q.dtype)
+        ways = find_ways(scene)
         extent = extents(scene, ways, link_poses(scene, world, anywhere))
     return _in_blocks(block, q, world, motion, extent)
+
+
+def _margins(
+    rules: Sequence[Sequence[Rule]], score: Score, closer: jax.Array | float
+) -> list[jax.Array | float]:
+    """`[n, B]`, `[n, 1]` or a number [m], by obstacle: what its pairs ask for and move."""
+    if score.exact:
+        return [score.margin + closer for _ in rules]
+    return [required(own, score.margin) + closer for own in rules]
 
 
 def _in_slots(world: World, rows: list[int]) -> Shapes:
@@ -183,59 +183,15 @@ def _least_over_slots(
     axes = [[still + (i == k) for i in range(3)] for k in range(3)]
     rated = []
     # Written out: in a loop, XLA on CPU takes three times as long.
-    for row in rows:
+    for j, row in enumerate(rows):
         pose, size = world.slot_pose[row], world.slot_size[row]
         if pose.shape[-1] == 1:  # numbers are faster than rows of one
             pose, size = pose[:, 0], size[:, 0]
         frame = jnp.concatenate([rotation_of(pose[3:]), pose[:3, None]], 1)
         near = seen_from(own, frame)
         size = [jnp.atleast_2d(size[k]) for k in range(3)]
-        rated.append(function(near, Shapes([still] * 3, axes, size), score))
+        rated.append(function(near, Shapes([still] * 3, axes, size), score.among(j, 1)))
     return reduce(smaller, rated)
-
-
-def _fronts(scene: Scene) -> list[Front]:
-    """Contacts in closed form, put together by obstacle and by who faces it, slots apart."""
-    facing = defaultdict(list)
-    slots = {slot.geom for slot in scene.slots}
-    for index, group in enumerate(scene.groups):
-        for contact in group.contacts:
-            if (contact.a.kind, contact.b.kind) not in CLOSED:
-                continue
-            moves = contact.a.ids[0] in slots
-            facing[contact.b, contact.a.kind, moves].append((contact.a, index))
-    together = defaultdict(list)
-    for (obstacle, kind, _), sides in facing.items():
-        key = tuple(sides), obstacle.body, (kind, obstacle.kind)
-        together[key].append(obstacle)
-    fronts = []
-    for (sides, _, kinds), obstacles in together.items():
-        rows = [(g, s.body, index) for s, index in sides for g in s.ids]
-        geoms, bodies, groups = zip(*rows, strict=True)
-        links = tuple(scene.structure.link_of[body] for body in bodies)
-        fronts.append(Front(geoms, links, groups, tuple(obstacles), kinds))
-    return fronts
-
-
-def _convex_pairs(scene: Scene) -> ConvexPairs:
-    """The other contacts, pair by pair."""
-    slots = {slot.geom for slot in scene.slots}
-    geoms: dict[tuple[str, bool], dict[int, None]] = defaultdict(dict)
-    pairs: list[tuple[int, int]] = []
-    groups: list[int] = []
-    for index, group in enumerate(scene.groups):
-        for contact in group.contacts:
-            if (contact.a.kind, contact.b.kind) in CLOSED:
-                continue
-            for side in (contact.a, contact.b):
-                for geom in side.ids:
-                    geoms[side.kind, geom in slots][geom] = None
-            own = geom_pairs(contact)
-            pairs += own
-            groups += [index] * len(own)
-    return ConvexPairs(
-        {key: tuple(ids) for key, ids in geoms.items()}, tuple(pairs), tuple(groups)
-    )
 
 
 def counting(scene: Scene, world: World) -> jax.Array:

@@ -16,13 +16,16 @@ from jaxplan.scene.dependent import follow
 from jaxplan.scene.quiet_mjx import mjx
 
 
-def least_distances(scene: Scene, world: World, q: jax.Array) -> jax.Array:
+def least_distances(
+    scene: Scene, world: World, q: jax.Array, margins: jax.Array | None = None
+) -> jax.Array:
     """Least signed distance over all pairs that count.
 
     Args:
         scene: The scene.
         world: Leaves with the batch last, `[..., N]` or `[..., 1]`.
         q: `[d, N]` joints.
+        margins: `[ngeom, ngeom]` of each pair, subtracted [m].
 
     Returns:
         `[N]` [m].
@@ -49,7 +52,10 @@ def least_distances(scene: Scene, world: World, q: jax.Array) -> jax.Array:
         ]
         counts = jnp.stack([*counts, jnp.array(False)])
         index = groups[contact.geom[:, 0], contact.geom[:, 1]]
-        return jnp.min(jnp.where(counts[index], contact.dist, jnp.inf))
+        distance = contact.dist
+        if margins is not None:
+            distance -= margins[contact.geom[:, 0], contact.geom[:, 1]]
+        return jnp.min(jnp.where(counts[index], distance, jnp.inf))
 
     shared: list[Any] = [None if leaf.shape[-1] == 1 else -1 for leaf in world]
     axes = World(*shared)

@@ -6,7 +6,7 @@ Python loop over a running minimum. XLA turns it into one vectorised pass over t
 cache; boolean reductions, or obstacles as an axis, are ten times slower.
 """
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from functools import partial, reduce
 
 import jax
@@ -28,11 +28,7 @@ def _clip(x: jax.Array, bound: jax.Array) -> jax.Array:
     return smaller(larger(x, -bound), bound)
 
 
-def _least(scores: Iterable[jax.Array]) -> jax.Array:
-    return reduce(smaller, scores)
-
-
-def _each(b: Shapes) -> Iterator[Shapes]:
+def _each(b: Shapes, score: Score) -> Iterator[tuple[Shapes, Score]]:
     """The obstacles one by one, `[B]`, or numbers where the whole batch shares them.
 
     Numbers, because XLA on CPU takes half the time for them that it takes for rows of one.
@@ -42,54 +38,65 @@ def _each(b: Shapes) -> Iterator[Shapes]:
         return leaf[j, 0] if leaf.shape[-1] == 1 else leaf[j]
 
     for j in range(len(b.size[0])):
-        yield Shapes(*jax.tree.map(partial(one, j=j), tuple(b)[:3]))
+        yield Shapes(*jax.tree.map(partial(one, j=j), tuple(b)[:3])), score.against(j)
+
+
+def _least(
+    one: Callable[[Shapes, Score], jax.Array], b: Shapes, score: Score
+) -> jax.Array:
+    """Least score over the obstacles."""
+    return reduce(smaller, (one(*pair) for pair in _each(b, score)))
 
 
 def sphere_plane(a: Shapes, b: Shapes, score: Score) -> jax.Array:
     """Height above the planes."""
-    heights = (dot(minus(a.centre, o.centre), o.axes[2]) for o in _each(b))
-    return score.of(_least(heights), a.size[0])
+
+    def one(o: Shapes, score: Score) -> jax.Array:
+        return score.of(dot(minus(a.centre, o.centre), o.axes[2]), a.size[0])
+
+    return _least(one, b, score)
 
 
 def convex_plane(kind: str, a: Shapes, b: Shapes, score: Score) -> jax.Array:
     """Height of the lowest point."""
     cores = cores_of(kind, a)
 
-    def one(o: Shapes) -> jax.Array:
+    def one(o: Shapes, score: Score) -> jax.Array:
         normal = o.axes[2]
         up = [dot(axis, normal) for axis in a.axes]
         lowest = dot(farthest(cores, [-x for x in up]), up)
-        return dot(minus(a.centre, o.centre), normal) + lowest
+        height = dot(minus(a.centre, o.centre), normal) + lowest
+        return score.of(height, cores.radius)
 
-    return score.of(_least(map(one, _each(b))), cores.radius)
+    return _least(one, b, score)
 
 
 def sphere_sphere(a: Shapes, b: Shapes, score: Score) -> jax.Array:
     """Distance of centres."""
 
-    def one(o: Shapes) -> jax.Array:
+    def one(o: Shapes, score: Score) -> jax.Array:
         offset = minus(a.centre, o.centre)
         return score.of_squared(dot(offset, offset), a.size[0] + o.size[0])
 
-    return _least(map(one, _each(b)))
+    return _least(one, b, score)
 
 
 def sphere_capsule(a: Shapes, b: Shapes, score: Score) -> jax.Array:
     """Distance to the nearest point of the capsule's line."""
 
-    def one(o: Shapes) -> jax.Array:
+    def one(o: Shapes, score: Score) -> jax.Array:
         offset = minus(a.centre, o.centre)
         along = _clip(dot(offset, o.axes[2]), o.size[1])
         offset = minus(offset, times(along, o.axes[2]))
         return score.of_squared(dot(offset, offset), a.size[0] + o.size[0])
 
-    return _least(map(one, _each(b)))
+    return _least(one, b, score)
 
 
 def capsule_capsule(a: Shapes, b: Shapes, score: Score) -> jax.Array:
     """Distance of segments (Ericson, Real-Time Collision Detection, 5.1.9)."""
 
-    def one(o: Shapes) -> jax.Array:
+    def one(o: Shapes, score: Score) -> jax.Array:
         axis_a, axis_b, offset = a.axes[2], o.axes[2], minus(a.centre, o.centre)
         across = dot(axis_a, axis_b)
         along_a, along_b = dot(axis_a, offset), dot(axis_b, offset)
@@ -101,13 +108,13 @@ def capsule_capsule(a: Shapes, b: Shapes, score: Score) -> jax.Array:
         gap = minus(offset, minus(times(t, axis_b), times(s, axis_a)))
         return score.of_squared(dot(gap, gap), a.size[0] + o.size[0])
 
-    return _least(map(one, _each(b)))
+    return _least(one, b, score)
 
 
 def sphere_cylinder(a: Shapes, b: Shapes, score: Score) -> jax.Array:
     """Distance in the plane through the cylinder's axis."""
 
-    def one(o: Shapes) -> jax.Array:
+    def one(o: Shapes, score: Score) -> jax.Array:
         offset = minus(a.centre, o.centre)
         along = dot(offset, o.axes[2])
         across = minus(offset, times(along, o.axes[2]))
@@ -119,15 +126,15 @@ def sphere_cylinder(a: Shapes, b: Shapes, score: Score) -> jax.Array:
             rated += smaller(larger(over[0], over[1]), 0.0)
         return rated
 
-    return _least(map(one, _each(b)))
+    return _least(one, b, score)
 
 
 def sphere_box(a: Shapes, b: Shapes, score: Score) -> jax.Array:
     """Distance to boxes whose axes agree up to order and sign: one turn serves all."""
-    frame = next(_each(b)).axes
+    frame = next(_each(b, score))[0].axes
     points = [dot(axis, a.centre) for axis in frame]
 
-    def one(o: Shapes) -> jax.Array:
+    def one(o: Shapes, score: Score) -> jax.Array:
         over = []
         for point, axis in zip(points, frame, strict=True):
             # Which of the box's axes this is: the products are 0, 0 and 1.
@@ -139,7 +146,7 @@ def sphere_box(a: Shapes, b: Shapes, score: Score) -> jax.Array:
             rated += smaller(larger(larger(over[0], over[1]), over[2]), 0.0)
         return rated
 
-    return _least(map(one, _each(b)))
+    return _least(one, b, score)
 
 
 SOLID = ("sphere", "capsule", "ellipsoid", "cylinder", "box", "mesh")

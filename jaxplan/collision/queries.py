@@ -11,6 +11,7 @@ import numpy.typing as npt
 from jaxplan.collision.bounds import group_bounds, pair_reaches
 from jaxplan.collision.checks import checked
 from jaxplan.collision.engine import least_scores
+from jaxplan.collision.margins import required_clearances
 from jaxplan.collision.mjx_backend import least_distances
 from jaxplan.collision.narrow import Score
 from jaxplan.collision.world import OWN_AXES, World, batch_shape
@@ -46,7 +47,7 @@ def clearance(
         quaternion is zero.
     """
     world, q = checked(scene, world, q=q)
-    return _flat(scene, world, q, Score(exact=True), backend, motion)
+    return _flat(scene, world, q, None, backend, motion)
 
 
 def config_free(
@@ -58,6 +59,9 @@ def config_free(
     motion: jax.Array | None = None,
 ) -> jax.Array:
     """Whether clearance > margin; False where something is not finite.
+
+    Of each pair the margin is the greater of this one and the model's own, the sum of its
+    geoms' or that of an explicit pair (`required_clearances`).
 
     Args:
         scene: The scene.
@@ -74,8 +78,7 @@ def config_free(
     world, q = checked(scene, world, q=q)
     if not isinstance(margin, jax.Array):
         margin = numbers("margin", margin)
-    score = Score(backend == "mjx", jnp.asarray(margin, jnp.float32))
-    return _flat(scene, world, q, score, backend, motion) > 0
+    return _flat(scene, world, q, _single(margin), backend, motion) > 0
 
 
 def motion_free(
@@ -136,19 +139,17 @@ def motion_bound(
         scene: The scene.
         world: Its leading axes broadcast against those of dq.
         dq: `[..., d]` from the start of the motion to its end [rad or m].
-        q_min: `[d]` lower limits [rad or m]; the scene's where None.
+        q_min: `[d]` lower limits [rad or m]; the scene's where None, which is for concrete
+            scenes where joints depend on others (`Scene.q_min`).
         q_max: `[d]` upper limits.
 
     Returns:
         `[...]` [m]; infinite where a hinge turns that has a slide without limits above it on
         the way to a geom, NaN where something is not finite.
     """
-    limits = q_min, q_max
-    own = scene.q_min, scene.q_max
-    bounds = [
-        x if given is None else given for x, given in zip(own, limits, strict=True)
-    ]
-    scene, world, dq, low, high = jax.tree.map(_single, (scene, world, dq, *bounds))
+    low = scene.q_min if q_min is None else q_min
+    high = scene.q_max if q_max is None else q_max
+    scene, world, dq, low, high = jax.tree.map(_single, (scene, world, dq, low, high))
     shape, finite, flat, (rows,) = _flatten(world, dq)
     if not scene.groups:
         return jnp.where(finite, 0.0, jnp.nan)
@@ -180,20 +181,22 @@ def _flat(
     scene: Scene,
     world: World,
     q: jax.Array,
-    score: Score,
+    margin: jax.Array | None,
     backend: Backend,
     motion: jax.Array | None = None,
 ) -> jax.Array:
-    """Asks the backend about the flattened batch."""
+    """Asks the backend about the flattened batch; without a margin, for distances."""
     refuse_fork()
     check("backend", backend, Backend)
     scene, world, q, motion = jax.tree.map(_single, (scene, world, q, motion))
     given = [q] if motion is None else [q, motion]
     shape, finite, flat, rows = _flatten(world, *given)
     if backend == "fast":
+        score = Score(exact=True) if margin is None else Score(False, margin)
         scores = least_scores(scene, flat, rows[0], score, *rows[1:])
     else:
-        scores = least_distances(scene, flat, rows[0]) - score.margin
+        table = None if margin is None else required_clearances(scene, margin)
+        scores = least_distances(scene, flat, rows[0], table)
         if motion is not None and scene.groups:
             scores -= jnp.max(group_bounds(scene, flat, rows[1]), 0)
     return jnp.where(finite, scores.reshape(shape), jnp.nan)

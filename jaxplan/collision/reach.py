@@ -28,6 +28,7 @@ from jaxplan.collision.shapes import (
     minus,
     once,
     read,
+    total,
 )
 from jaxplan.collision.world import World
 from jaxplan.scene import Scene
@@ -90,16 +91,9 @@ class Extent(NamedTuple):
         return Extent(*(jnp.stack([leaf[g].max(0) for g in rows]) for leaf in self))
 
 
-def rates_of(scene: Scene) -> np.ndarray:
-    """`[n, d]` how far joints (the arm's, passive, dependent) move by each of the arm's."""
-    if getattr(scene.structure, "dependent", ()):
-        return scene.rates  # pyright: ignore[reportAttributeAccessIssue]
-    return np.eye(len(scene.joints) + len(scene.passive), len(scene.joints))
-
-
 def link_rates(scene: Scene) -> np.ndarray:
     """`[1 + n_links, d]` how far the links' joints move by each of the arm's."""
-    rates = np.concatenate([rates_of(scene), np.zeros((1, len(scene.joints)))])
+    rates = np.concatenate([scene.rates, np.zeros((1, len(scene.joints)))])
     return rates[[-1, *(link.variable for link in scene.structure.links)]]
 
 
@@ -111,11 +105,12 @@ def link_slides(scene: Scene) -> np.ndarray:
 def find_ways(scene: Scene) -> Ways:
     """Which joints count for each side of each contact."""
     order: dict[Way, int] = {Way((), ()): 0}
+    moves = np.any(link_rates(scene), 1)
     of_side = {}
     for index, group in enumerate(scene.groups):
         bodies = [side.body for side in group.contacts[0]]
         found: dict[int, dict[int, None]] = {body: {} for body in bodies}
-        for one, other in product(*(_lines(scene, body) for body in bodies)):
+        for one, other in product(*(_lines(scene, moves, body) for body in bodies)):
             held = {*one.held, *other.held}
             if len(dict(held)) < len(held):
                 continue  # one object cannot be both
@@ -128,19 +123,20 @@ def find_ways(scene: Scene) -> Ways:
     return Ways(tuple(order), of_side)
 
 
-def _lines(scene: Scene, body: int) -> list[Way]:
+def _lines(scene: Scene, moves: np.ndarray, body: int) -> list[Way]:
     """All that the arm moves above a body; one for each: its object in the hand or not."""
     structure = scene.structure
-    own, thing = _line(scene, structure.link_of[body])
-    carrier, base = _line(scene, structure.link_of[scene.body_id(scene.hand)])
+    own, thing = _line(scene, moves, structure.link_of[body])
+    hand = structure.link_of[scene.body_id(scene.hand)]
+    carrier, base = _line(scene, moves, hand)
     if thing in (-1, base) or scene.objects[thing] in scene.mocap:
         return [Way(own, ())]
     return [Way(own, ((thing, False),)), Way((*own, *carrier), ((thing, True),))]
 
 
-def _line(scene: Scene, row: int) -> tuple[tuple[int, ...], int]:
+def _line(scene: Scene, moves: np.ndarray, row: int) -> tuple[tuple[int, ...], int]:
     """Links above, a link included, whose joint the arm moves; the object above, or -1."""
-    moves, rows, thing = link_rates(scene).any(1), [], -1
+    rows, thing = [], -1
     while row:
         link = scene.structure.links[row - 1]
         if moves[row]:
@@ -208,7 +204,7 @@ def joint_axes(scene: Scene, poses: jax.Array) -> tuple[jax.Array, jax.Array]:
     )
 
     def turned(vectors: jax.Array) -> jax.Array:
-        return sum(poses[:, :, k] * vectors[:, k, None] for k in range(3))
+        return total(poses[:, :, k] * vectors[:, k, None] for k in range(3))
 
     return turned(point) + poses[:, :, 3], turned(along)
 

@@ -6,7 +6,7 @@ the frames of their bodies, where they are constants, and carried to where they 
 
 from collections.abc import Iterable
 from functools import partial, reduce
-from typing import NamedTuple, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import jax
 import jax.numpy as jnp
@@ -28,9 +28,21 @@ class Score(NamedTuple):
     exact: bool
     """True: signed distance [m]. False: only the sign of distance - margin counts,
     which spares the square root and what happens inside a box."""
-    margin: jax.Array | float = 0.0
-    """[m], at least 0; subtracted. One for all; or of each geom that faces obstacles
-    `[n, B]`, of each convex pair `[P, B]`."""
+    margin: Any = 0.0
+    """[m], at least 0; subtracted. A number or `[n, B]`; in closed form one for each of the
+    obstacles that the geoms face, in a list."""
+
+    def among(self, first: int, count: int) -> "Score":
+        """For some of the obstacles."""
+        if not isinstance(self.margin, list):
+            return self
+        return self._replace(margin=self.margin[first : first + count])
+
+    def against(self, obstacle: int) -> "Score":
+        """For one of the obstacles."""
+        if not isinstance(self.margin, list):
+            return self
+        return self._replace(margin=self.margin[obstacle])
 
     def of_squared(self, squared: jax.Array, radius: jax.Array | float) -> jax.Array:
         """Rates a squared distance between cores that are `radius` thick together."""
