@@ -106,7 +106,7 @@ def test_every_answer_is_solved_and_certified(planner, questions, answers):
         np.testing.assert_allclose(answer.path[[0, -1]], [start, goal], atol=1e-6)
         certificate = planner.certify(answer)
         assert certificate.valid
-        assert certificate.clearance == np.inf
+        assert certificate.clearance > 0
     assert sum(len(answer.path) > 2 for answer in answers) > 5
 
 
