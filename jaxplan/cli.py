@@ -1,6 +1,7 @@
 """The command `jaxplan`."""
 
 import difflib
+import io
 import os
 import sys
 from collections.abc import Callable
@@ -10,6 +11,8 @@ from typing import Any, Literal, NoReturn
 
 import tyro
 from tyro.conf import Positional
+
+from jaxplan.interrupt import CLOSED, INTERRUPTED, end_on_interrupt
 
 
 @dataclass(frozen=True)
@@ -78,8 +81,17 @@ COMMANDS = {"plan": Plan, "check": Check, "solve": Solve}
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Runs a command; 0 when done, 1 if the answer is no, 2 for bad input."""
-    arguments = sys.argv[1:] if arguments is None else arguments
+    """Runs a command; 0 when done, 1 if the answer is no, 2 for bad input.
+
+    Args:
+        arguments: None: this process is the command, with those of its command line.
+    """
+    if arguments is None:
+        _be_a_program()
+    return _guarded(lambda: _run(sys.argv[1:] if arguments is None else arguments))
+
+
+def _run(arguments: list[str]) -> int:
     if arguments and not arguments[0].startswith("-") and arguments[0] not in COMMANDS:
         near = difflib.get_close_matches(arguments[0], COMMANDS, 1)
         known = f" (there is: {', '.join(COMMANDS)})"
@@ -88,7 +100,7 @@ def main(arguments: list[str] | None = None) -> int:
     command = tyro.extras.subcommand_cli_from_dict(
         COMMANDS, prog="jaxplan", args=arguments
     )
-    return _guarded(lambda: RUN[type(command)](command))
+    return RUN[type(command)](command)
 
 
 def run_script(main: Callable[[Any], None], arguments: type) -> NoReturn:
@@ -96,19 +108,33 @@ def run_script(main: Callable[[Any], None], arguments: type) -> NoReturn:
 
     The scripts of `train/` and `eval/` end here: 0 when done, 2 and one line for bad input.
     """
-    options = tyro.cli(arguments)
+    _be_a_program()
 
     def run() -> int:
-        main(options)
+        main(tyro.cli(arguments))
         return 0
 
     sys.exit(_guarded(run))
 
 
+def _be_a_program() -> None:
+    """Ctrl-C ends the process, and a line is written when it is printed."""
+    end_on_interrupt()
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(line_buffering=True)
+
+
 def _guarded(run: Callable[[], int]) -> int:
-    """The exit code of `run`; bad input is one line and 2."""
+    """The exit code of `run`; bad input is one line and 2, a closed pipe is no error."""
     try:
         return run()
+    except KeyboardInterrupt:
+        print("interrupted", file=sys.stderr)
+        return INTERRUPTED
+    except BrokenPipeError:
+        # What is still to be written, at exit, goes nowhere.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return CLOSED
     except (ValueError, RuntimeError, OSError) as error:
         return _fail((str(error) or type(error).__name__).splitlines()[0])
 

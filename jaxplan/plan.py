@@ -15,8 +15,8 @@ class Plan:
 
     status: Status
     path: np.ndarray
-    """`[n, d]` waypoints from q_start to q_goal [rad]; where the budget was exhausted, to the
-    node nearest to the goal; without rows where nothing was searched."""
+    """`[n, d]` waypoints from q_start to q_goal [rad or m]; where the budget was exhausted, to
+    the node nearest to the goal; without rows where nothing was searched."""
     expansions: int
     checks: int
     """Configurations of motions that were checked."""
@@ -34,7 +34,7 @@ class Plan:
 
     @property
     def length(self) -> float:
-        """Of the path, in joint space [rad]."""
+        """Of the path, in joint space [rad, or m of slides]."""
         return float(np.linalg.norm(np.diff(self.path, axis=0), axis=1).sum())
 
 
@@ -44,10 +44,10 @@ class Timed(NamedTuple):
     t: np.ndarray
     """`[T]` [s], from 0."""
     q: np.ndarray
-    """`[T, d]` [rad]."""
+    """`[T, d]` [rad or m]."""
     qd: np.ndarray
-    """`[T, d]` [rad/s]."""
+    """`[T, d]` [rad/s or m/s]."""
     qdd: np.ndarray
-    """`[T, d]` [rad/s^2]; the one that holds from each sample on."""
+    """`[T, d]` [rad/s^2 or m/s^2]; the one that holds from each sample on."""
     free: bool
     """Every sample is; false only if the world has changed since the plan was made."""

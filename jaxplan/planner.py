@@ -9,35 +9,35 @@ Statuses say what came of a question; exceptions say that it was none.
 """
 
 import dataclasses
-import os
+import math
 import time
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from functools import cached_property, partial
-from typing import Any
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 from numpy.typing import ArrayLike
 
 from jaxplan import collision, questions
+from jaxplan.blocks import in_blocks
 from jaxplan.collision import Certificate, World, make_world
+from jaxplan.compiled import Compiled, Questions, Sampler, keys_of
 from jaxplan.config import PlannerConfig, TrajectoryConfig
+from jaxplan.goals import Goals, goals_of, stacked
+from jaxplan.ik import Limits, inverse_kinematics
 from jaxplan.plan import Plan, Timed
-from jaxplan.planning import PlanResult, Segment, Status, make_planner
-from jaxplan.reason import no_path
+from jaxplan.planning import PlanResult, Status
+from jaxplan.planning.settings import check_settings
+from jaxplan.planning.space import TURN
+from jaxplan.pose import Pose
+from jaxplan.process import refuse_fork
+from jaxplan.ranges import Positive, Step, check
+from jaxplan.reason import Asked, no_path
 from jaxplan.scene import Scene
 from jaxplan.trajectory import Rung, make_trajectory
 
-Sampler = Callable[[jax.Array, jax.Array, jax.Array, int], Segment]
-"""`(key, q_start [d], q_goal [d], count) -> Segment [count]`: tree-extension segments for a
-problem, with the configurations where they begin or without; traced by JAX."""
-
-BANK = 64
-"""Segments that a sampler is asked for at a time."""
-UNLIMITED = {"hinge": 2 * np.pi, "slide": 10.0}
-"""How far from 0 a joint without limits is searched [rad or m]."""
+Goal = ArrayLike | Pose
+"""A configuration `[d]`, several `[G, d]` of which any will do, or where a body is to be."""
 
 
 class Planner:
@@ -53,7 +53,8 @@ class Planner:
         sampler: Proposes segments; without it all proposals are uniform.
         velocity: Of each joint at most, or `[d]` [rad/s or m/s].
         acceleration: Of each joint at most, or `[d]` [rad/s^2 or m/s^2].
-        q_min: `[d]` lower joint limits; the model's where None.
+        q_min: `[d]` lower joint limits; the model's where None. A hinge without limits
+            comes round: q and q + 2 pi are the same.
         q_max: `[d]` upper joint limits; the model's where None.
 
     Raises:
@@ -71,17 +72,26 @@ class Planner:
         q_min: ArrayLike | None = None,
         q_max: ArrayLike | None = None,
     ) -> None:
+        check("scene", scene, Scene)
+        check("config", config, PlannerConfig)
+        check("trajectory", trajectory, TrajectoryConfig)
+        check("sampler", sampler, Callable | None)
         self.scene, self.config = scene, config
-        self._trajectory, self._sampler = trajectory, sampler
+        self._trajectory = trajectory
         self._d = d = len(scene.joints)
         self._velocity = questions.most(velocity, d, "velocity")
         self._acceleration = questions.most(acceleration, d, "acceleration")
-        far = np.array([UNLIMITED[scene.joint_kind(name)] for name in scene.joints])
-        self.q_min, self.q_max = (
-            np.clip(np.asarray(own if given is None else given, float), -far, far)
-            for own, given in ((scene.q_min, q_min), (scene.q_max, q_max))
-        )
-        self._searches: dict[bool, Callable[..., PlanResult]] = {}
+        own = scene.q_min, scene.q_max
+        limits = questions.joint_limits((q_min, q_max), own, scene.joints)
+        self.q_min, self.q_max = limits
+        self.circular = scene.circular & np.isinf(self.q_min) & np.isinf(self.q_max)
+        check_settings(config, d)
+        self._compiled = Compiled(scene, config, self.limits, sampler)
+
+    @property
+    def limits(self) -> Limits:
+        """Of the joints."""
+        return Limits(self.q_min, self.q_max, self.circular)
 
     @cached_property
     def empty_world(self) -> World:
@@ -91,62 +101,94 @@ class Planner:
     def plan(
         self,
         q_start: ArrayLike,
-        q_goal: ArrayLike,
+        q_goal: Goal,
         seed: int = 0,
         world: World | None = None,
+        time_limit: float | None = None,
     ) -> Plan:
         """Finds a collision-free path.
 
-        The same question with the same seed has the same answer, alone or in a batch.
+        The same question with the same seed has the same answer, alone or in a batch, unless
+        a time limit ends it.
 
         Args:
-            q_start: `[d]` [rad].
-            q_goal: `[d]` [rad].
+            q_start: `[d]` [rad or m].
+            q_goal: `[d]` [rad or m]; several, `[G, d]`, of which any will do (method
+                `rrt_connect`); or a `Pose` of a body.
             seed: At least 0.
             world: Where things are, see `collision.make_world`; the model's where None.
+            time_limit: What is open then is TIME_OUT [s]; what has to be compiled counts too.
 
         Raises:
             ValueError: An argument of the wrong shape or type.
         """
         start = questions.rows(q_start, 1, self._d, "q_start")[None]
-        goal = questions.rows(q_goal, 1, self._d, "q_goal")[None]
-        return self._plan(start, goal, [seed], world)[0]
+        seeds = questions.seeds_of([seed])
+        return self._plan(start, [q_goal], seeds, world, time_limit)[0]
 
     def plan_batch(
         self,
         q_starts: ArrayLike,
-        q_goals: ArrayLike,
+        q_goals: ArrayLike | Sequence[Goal],
         seeds: Sequence[int] | None = None,
         worlds: World | Sequence[World] | None = None,
+        time_limit: float | None = None,
     ) -> list[Plan]:
         """Answers P questions in one call.
 
         Args:
-            q_starts: `[P, d]` [rad].
-            q_goals: `[P, d]` [rad].
+            q_starts: `[P, d]` [rad or m].
+            q_goals: `[P, d]` or `[P, G, d]` [rad or m], or P goals as `plan` takes them.
             seeds: P, each at least 0; 0 to P - 1 where None.
             worlds: One for all, one for each, or one whose leaves have a leading axis P.
+            time_limit: Of all of them together [s].
 
         Raises:
             ValueError: An argument of the wrong shape or type.
         """
-        q_starts, q_goals = (
-            questions.rows(q, 2, self._d, n)
-            for q, n in ((q_starts, "q_starts"), (q_goals, "q_goals"))
-        )
-        seeds = list(range(len(q_starts))) if seeds is None else list(seeds)
-        if not len(q_starts) == len(q_goals) == len(seeds):
-            sizes = f"{len(q_starts)}, {len(q_goals)} and {len(seeds)}"
+        q_starts = questions.rows(q_starts, 2, self._d, "q_starts")
+        goals = questions.goals(q_goals, self._d)
+        seeds = questions.seeds_of(range(len(q_starts)) if seeds is None else seeds)
+        if not len(q_starts) == len(goals) == len(seeds):
+            sizes = f"{len(q_starts)}, {len(goals)} and {len(seeds)}"
             raise ValueError(f"q_starts, q_goals and seeds have {sizes} rows")
         if worlds is None or isinstance(worlds, World):
-            return self._plan(q_starts, q_goals, seeds, worlds)
-        rows = [questions.world_of(world, self.empty_world, ()) for world in worlds]
-        if len(rows) != len(seeds):
-            raise ValueError(f"{len(rows)} worlds for {len(seeds)} questions")
-        stacked = (
-            jax.tree.map(lambda *leaves: np.stack(leaves), *rows) if rows else None
-        )
-        return self._plan(q_starts, q_goals, seeds, stacked)
+            return self._plan(q_starts, goals, seeds, worlds, time_limit)
+        each = questions.worlds_of(worlds, self.empty_world, len(seeds))
+        return self._plan(q_starts, goals, seeds, each, time_limit)
+
+    def ik(
+        self,
+        pose: Pose,
+        world: World | None = None,
+        reference: ArrayLike | None = None,
+        seed: int = 0,
+        count: int = 32,
+    ) -> np.ndarray:
+        """Free configurations that bring a body to a pose, from the nearest to the reference on.
+
+        Args:
+            pose: What is wanted.
+            world: The model's own where None.
+            reference: `[d]` [rad or m]; the model's reference pose where None.
+            seed: Of the starts of the descent, at least 0.
+            count: Of configurations at most.
+
+        Returns:
+            `[n, d]` [rad or m]; n = 0 where none is found that is within limits and free.
+
+        Raises:
+            ValueError: An argument that makes no sense.
+        """
+        refuse_fork()
+        check("pose", pose, Pose)
+        given = self.empty_world if world is None else world
+        world = questions.world_of(given, self.empty_world, ())
+        (seed,) = questions.seeds_of([seed])
+        free = partial(self._compiled.free, world)
+        return inverse_kinematics(
+            self.scene, world, pose, self.limits, reference, seed, count, free
+        ).q
 
     def time(self, plan: Plan, speed: float = 1.0) -> Timed:
         """Shortens, smooths and times a path (section 4.3), and checks all of it again.
@@ -156,20 +198,26 @@ class Planner:
             speed: Factor on the velocity limits, its square on the accelerations.
 
         Raises:
-            ValueError: The plan has no path to its goal.
+            ValueError: The plan has no path to its goal, or one that is empty or not
+                finite; a speed that makes no sense.
         """
+        refuse_fork()
+        check("plan", plan, Plan)
         if not plan.solved:
             raise ValueError(f"no motion to time: {plan.reason}")
-        if not 0 < speed < np.inf:
-            raise ValueError(f"speed {speed}, expected more than 0")
+        path = questions.waypoints(plan.path, self._d)
+        world = questions.world_of(plan.world, self.empty_world, ())
+        speed = questions.number(speed, Step, "speed")
         timed = make_trajectory(
-            plan.path[None],
-            np.array([len(plan.path)]),
-            jax.random.key(plan.seed)[None],
-            lambda problem, q: self._free(plan.world, q),
+            path[None],
+            np.array([len(path)]),
+            keys_of(questions.seeds_of([plan.seed])),
+            lambda problem, q: self._compiled.free(world, q),
             speed * self._velocity,
             speed**2 * self._acceleration,
             self._trajectory,
+            self.circular,
+            lambda problem, q, motion: self._compiled.swept(world, q, motion),
         )
         q, qd, qdd = (x[0, : timed.length[0]] for x in (timed.q, timed.qd, timed.qdd))
         free = bool(timed.rung[0] != Rung.INVALID)
@@ -208,158 +256,117 @@ class Planner:
 
         Args:
             qs: `[..., d]` [rad].
-            world: The model's own where None.
+            world: The model's own where None; its leading axes broadcast against those
+                of qs.
+
+        Raises:
+            ValueError: An argument of the wrong shape or type.
         """
-        q = np.asarray(qs, np.float32)
-        if q.ndim < 1 or q.shape[-1] != self._d:
-            raise ValueError(f"qs has shape {q.shape}, expected (..., {self._d})")
-        world = self.empty_world if world is None else world
-        return np.asarray(self._clearance(world, q))
-
-    @cached_property
-    def _clearance(self) -> Callable:
-        return _jit(lambda world, q: collision.clearance(self.scene, world, q))
-
-    @cached_property
-    def _free(self) -> Callable:
-        margin = self.config.margin
-        return _jit(
-            lambda world, q: collision.config_free(self.scene, world, q, margin)
-        )
+        refuse_fork()
+        q = questions.rows(qs, None, self._d, "qs")
+        empty = self.empty_world
+        world = empty if world is None else world
+        batch = questions.batch_of(world, empty, q.shape[:-1])
+        world = questions.world_of(world, empty, batch)
+        q = np.broadcast_to(q, (*batch, self._d)).reshape(-1, self._d)
+        if world.passive.ndim == empty.passive.ndim:  # one for all
+            found = in_blocks(partial(self._compiled.clearance, world), q)
+        else:
+            leaves = zip(world, empty, strict=True)
+            each = World(*(leaf.reshape(len(q), *own.shape) for leaf, own in leaves))
+            found = in_blocks(self._compiled.clearance, each, q)
+        return found.reshape(batch)
 
     def _plan(
         self,
         q_start: np.ndarray,
-        q_goal: np.ndarray,
+        goals: Sequence[Goal],
         seeds: Sequence[int],
         world: World | None,
+        time_limit: float | None,
     ) -> list[Plan]:
         """Plans for rows `[P, d]`; leaves of the world have a leading axis or none."""
-        count = len(questions.seeds_of(seeds))
-        empty = self.empty_world
+        refuse_fork()
+        limit = math.inf
+        if time_limit is not None:
+            limit = questions.number(time_limit, Positive, "time_limit")
+        count, empty = len(seeds), self.empty_world
         world = questions.world_of(empty if world is None else world, empty, (count,))
         own = bool(world.passive.ndim > empty.passive.ndim)
         if not count:
             return []
         began = time.perf_counter()
-        parts = _parts(count)
-        search = partial(self._search_rows, q_start, q_goal, seeds, world, own)
-        if len(parts) == 1:
-            answers = [search(parts[0])]
-        else:
-            with ThreadPoolExecutor(len(parts)) as pool:
-                answers = list(pool.map(search, parts))
-        seconds = time.perf_counter() - began
-        plans: dict[int, Plan] = {}
-        for rows, answer in zip(parts, answers, strict=True):
-            for place, row in enumerate(rows):
-                here = (
-                    jax.tree.map(lambda leaf, r=row: leaf[r], world) if own else world
-                )
-                length = int(answer.path_length[place])
-                plan = Plan(
-                    status=Status(int(answer.status[place])),
-                    path=np.asarray(answer.path[place, :length]),
-                    expansions=int(answer.expansions[place]),
-                    checks=int(answer.checks[place]),
-                    time=seconds,
-                    reason="",
-                    seed=seeds[row],
-                    world=here,
-                )
-                reason = no_path(
-                    self.scene,
-                    plan,
-                    q_start[row],
-                    q_goal[row],
-                    (self.q_min, self.q_max),
-                    self.config.margin,
-                )
-                plans[row] = dataclasses.replace(plan, reason=reason)
-        return [plans[row] for row in range(count)]
-
-    def _search_rows(
-        self,
-        q_start: np.ndarray,
-        q_goal: np.ndarray,
-        seeds: Sequence[int],
-        world: World,
-        own: bool,
-        rows: np.ndarray,
-    ) -> PlanResult:
-        """Searches some of the rows, padded to a size that compiles seldom."""
-        size = (
-            len(rows) if len(rows) == 1 else max(16, 1 << (len(rows) - 1).bit_length())
-        )
-        padded = np.resize(rows, size)
-        active = np.arange(size) < len(rows)
-        keys = _keys(np.array([seeds[row] for row in padded], np.uint32))
-        start, goal = q_start[padded], q_goal[padded]
-        if own:
-            world = jax.tree.map(lambda leaf: np.asarray(leaf)[padded], world)
-        draw = None if self._sampler is None else self._draw(keys, start, goal)
-        result = self._search(own)(world, start, goal, goal, keys, draw, active)
-        return jax.tree.map(np.asarray, result)
-
-    def _search(self, own: bool) -> Callable[..., PlanResult]:
-        """The compiled search; `own`: each problem has a world of its own."""
-        if own not in self._searches:
-
-            def config_free(
-                worlds: World, problem: jax.Array, q: jax.Array
-            ) -> jax.Array:
-                world = (
-                    jax.tree.map(lambda leaf: leaf[problem], worlds) if own else worlds
-                )
-                return collision.config_free(self.scene, world, q, self.config.margin)
-
-            self._searches[own] = make_planner(
-                config_free, self.config, self.q_min, self.q_max, _jit
+        worlds = [
+            jax.tree.map(lambda leaf, r=row: leaf[r], world) if own else world
+            for row in range(count)
+        ]
+        # A joint that comes round is searched near 0, and the path put back where it was.
+        whole = np.where(np.isfinite(q_start), np.round(q_start / TURN), 0)
+        turns = np.where(self.circular, TURN * whole, 0)
+        start = (q_start - turns).astype(np.float32)
+        read = [
+            goals_of(
+                goal,
+                start[row],
+                self.scene,
+                worlds[row],
+                self.limits,
+                seeds[row],
+                partial(self._compiled.free, worlds[row]),
             )
-        return self._searches[own]
+            for row, goal in enumerate(goals)
+        ]
+        if self.config.method != "rrt_connect":
+            read = [goal._replace(q=goal.q[:1]) for goal in read]
+        left = max(limit - (time.perf_counter() - began), 1e-3)
+        asked = Questions(start, stacked(read), seeds, world, own)
+        answer = self._compiled.search(asked, left)
+        seconds = time.perf_counter() - began
+        return [
+            self._answer(
+                jax.tree.map(lambda leaf, r=row: leaf[r], answer),
+                (start[row], read[row]),
+                turns[row],
+                seconds,
+                seeds[row],
+                worlds[row],
+            )
+            for row in range(count)
+        ]
 
-    def _draw(
-        self, keys: jax.Array, start: np.ndarray, goal: np.ndarray
-    ) -> Callable[[jax.Array], Segment]:
-        return lambda chunk: self._banks(keys, chunk, start, goal)
-
-    @cached_property
-    def _banks(self) -> Callable[..., Segment]:
-        count = max(BANK, self.config.workers)
-
-        def bank(key, chunk, q_start, q_goal):
-            # Apart from the numbers of the search, which fold in expansions from 0 on.
-            key = jax.random.fold_in(jax.random.fold_in(key, 2**31), chunk)
-            assert self._sampler is not None
-            segment = Segment(*self._sampler(key, q_start, q_goal, count))
-            many = count, len(q_start)
-            expected = {"direction": many, "length": (count,), "base": many}
-            for name, leaf in segment._asdict().items():
-                if leaf is not None and jnp.shape(leaf) != expected[name]:
-                    raise ValueError(
-                        f"the sampler's {name} has shape {jnp.shape(leaf)}, "
-                        f"expected {expected[name]}"
-                    )
-            return segment
-
-        return _jit(jax.vmap(bank))
-
-
-_jit: Any = partial(jax.jit, compiler_options=collision.XLA_OPTIONS)
-
-
-@jax.jit
-def _keys(seeds: jax.Array) -> jax.Array:
-    return jax.vmap(jax.random.key)(seeds)
-
-
-def _parts(count: int) -> list[np.ndarray]:
-    """Rows of each thread: XLA on CPU keeps one core and a half busy with a search.
-
-    Two threads a core, because hard problems make some end much later than others;
-    interleaving shares these fairly.
-    """
-    cores = os.cpu_count() or 1
-    wanted = min(2 * cores, count // 16) if jax.default_backend() == "cpu" else 1
-    threads = max(wanted, 1)
-    return [np.arange(count)[i::threads] for i in range(threads)]
+    def _answer(
+        self,
+        answer: PlanResult,
+        asked: tuple[np.ndarray, Goals],
+        turns: np.ndarray,
+        seconds: float,
+        seed: int,
+        world: World,
+    ) -> Plan:
+        """One question's answer, with its reason."""
+        q_start, goals = asked
+        status, path = Status(int(answer.status)), answer.path[: answer.path_length]
+        if goals.status is not None and status != Status.START_IN_COLLISION:
+            status, path = goals.status, path[:0]
+        plan = Plan(
+            status=status,
+            path=np.asarray(path) + turns.astype(np.float32),
+            expansions=int(answer.expansions),
+            checks=int(answer.checks),
+            time=seconds,
+            reason="",
+            seed=seed,
+            world=world,
+        )
+        near = dataclasses.replace(plan, path=np.asarray(path))
+        limits = self.q_min, self.q_max
+        question = Asked(
+            self.scene,
+            near,
+            q_start,
+            goals,
+            limits,
+            self.config.margin,
+            np.asarray(answer.nodes),
+        )
+        return dataclasses.replace(plan, reason=no_path(question))

@@ -278,7 +278,7 @@ def _read_config(path: str, kind: str) -> Training:
         raise UsageError(f"no such config: {path}{hint}")
     try:
         config: Any = runpy.run_path(path).get(kind)
-    except TypeError as error:  # a keyword that the dataclass does not have
+    except (TypeError, ValueError) as error:  # no such setting, or no such value
         raise UsageError(f"{path}: {error}") from None
     if not isinstance(config, KINDS[kind]):
         raise UsageError(f"{path} defines no `{kind} = {KINDS[kind].__name__}(...)`")

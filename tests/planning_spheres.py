@@ -118,7 +118,8 @@ class Oracle:
         return min(tied, key=lambda i: self.d(self.q[i], self.q_toggle))
 
     def free(self, q0, q1):
-        points = points_for(self.config.step_max, self.config.edge_resolution)
+        length = float(np.linalg.norm(np.float32(q1) - np.float32(q0)))
+        points = points_for(length, self.config.edge_resolution)
         share = (np.arange(points, dtype=np.float32) + 1)[:, None] / points
         q = np.where(share == 1, q1, q0 + share * (q1 - q0))[:, None]
         gap = ((q - self.world.centre) ** 2).sum(-1)

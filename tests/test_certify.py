@@ -334,7 +334,7 @@ def test_a_mocap_body_is_placed_by_the_world():
 
 
 def test_what_always_touches_is_found():
-    scene = Scene.from_mjcf("""<mujoco><worldbody>
+    text = """<mujoco><worldbody>
       <body name="base"><geom size=".1"/><body name="a"><joint name="a"/>
         <geom size=".01"/><body name="b" pos="0 0 .05"><joint name="b"/>
           <geom size=".01" pos="0 0 .04"/>
@@ -343,7 +343,8 @@ def test_what_always_touches_is_found():
               <geom size=".01" pos=".1 0 0"/></body>
             <body name="right"><joint name="right" type="slide"/>
               <geom size=".01" pos="-.1 0 0"/></body>
-      </body></body></body></body></worldbody></mujoco>""")
+      </body></body></body></body></worldbody></mujoco>"""
+    scene = Scene.from_mjcf(text, exclude=None)
     assert scene.joints == ("a", "b")
     found = dict(always_touching(scene))
     # A link on a base that does not move is no child of it to MuJoCo's filter.

@@ -2,7 +2,9 @@
 
 import ctypes.util
 import json
+import os
 import shutil
+import subprocess
 import sys
 from pathlib import Path
 from types import SimpleNamespace
@@ -190,6 +192,61 @@ def test_a_plan_is_written_certified_and_filmed(tmp_path, capsys):
     assert np.abs(frames[0].astype(int) - frames[-1]).max() > 50
 
 
+def jaxplan(*arguments: object, stdout: int = subprocess.PIPE, **env: str):
+    """Runs the command in a process of its own."""
+    return subprocess.run(
+        [sys.executable, "-m", "jaxplan", *map(str, arguments)],
+        stdout=stdout,
+        stderr=subprocess.PIPE,
+        text=True,
+        env=os.environ | env,
+        cwd=ARM.parents[1],
+        timeout=120,
+    )
+
+
+@pytest.mark.parametrize("command", [["check", ARM], ["--help"]], ids=["check", "help"])
+def test_a_closed_pipe_is_no_error(command):
+    reader, writer = os.pipe()
+    os.close(reader)
+    done = jaxplan(*command, stdout=writer)
+    os.close(writer)
+    assert (done.returncode, done.stderr) == (141, "")
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere MuJoCo brings its own")
+def test_who_does_not_render_does_not_care_for_gl(tmp_path):
+    done = jaxplan("check", ARM, MUJOCO_GL="nonsense")
+    assert (done.returncode, done.stderr) == (0, "")
+    film = (
+        "plan",
+        ARM,
+        "--start=left",
+        "--goal=home",
+        "--out",
+        tmp_path / "o",
+        "--video",
+    )
+    for command in (film, ("solve", "--seed", 0)):
+        done = jaxplan(*command, MUJOCO_GL="nonsense")
+        assert (done.returncode, done.stdout) == (2, "")
+        assert done.stderr.startswith("error: MUJOCO_GL=nonsense cannot render")
+        assert done.stderr.count("\n") == 1
+        assert "apt install" in done.stderr
+    assert not (tmp_path / "o").exists()
+
+
+def test_what_a_run_before_has_left_is_removed_and_nothing_else(tmp_path, capsys):
+    for name in ("plan.mp4", "plan.json", "notes.txt"):
+        (tmp_path / name).write_text("old")
+    command = ["plan", str(ARM), "--start=left", "--out", str(tmp_path)]
+    assert main([*command, "--goal=0,0,0"]) == 2  # asks nothing, writes nothing
+    assert (tmp_path / "plan.json").read_text() == "old"
+    assert main([*command, "--goal=0.8,0.9,0.9,0.4"]) == 0
+    assert {file.name for file in tmp_path.iterdir()} == {"plan.json", "notes.txt"}
+    assert json.loads((tmp_path / "plan.json").read_text())["status"] == "solved"
+
+
 def test_what_is_not_solved_is_1_with_its_reason(tmp_path, capsys):
     path = tmp_path / "robot.xml"
     path.write_text(
@@ -217,6 +274,34 @@ def test_check_says_what_planning_sees(capsys):
     ):
         assert words in output
     assert "<exclude" not in output
+
+
+def leg(side: str, joints: int) -> str:
+    link = f'<joint name="{side}%d" axis="0 1 0"/><geom size="0.05"/>'
+    text = "".join(
+        f'<body name="{side}_b{i}" pos="0 0 -1">{link % i}' for i in range(joints)
+    )
+    return text + "</body>" * joints
+
+
+def test_check_lists_many_joints_by_their_chains(tmp_path, capsys):
+    path = tmp_path / "robot.xml"
+    path.write_text(
+        "<mujoco><worldbody><body name='torso' pos='0 0 9'><joint name='waist'/>"
+        f"<joint name='rail' type='slide' range='-1 1'/><geom size='0.1'/>"
+        f"{leg('left', 5)}{leg('right', 5)}</body></worldbody></mujoco>"
+    )
+    main(["check", str(path), "--joints=waist,rail"])
+    lines = capsys.readouterr().out.splitlines()
+    assert "  waist: hinge, no limits, goes round" in lines
+    assert "  rail: slide, -1.0000 to 1.0000 m" in lines
+    assert "  from left_b0: left0, left1, left2, left3, left4" in lines
+    assert "  from right_b0: right0, right1, right2, right3, right4" in lines
+    both = ",".join(f"{side}{i}" for side in ("left", "right") for i in range(5))
+    main(["check", str(path), f"--joints={both}"])
+    lines = capsys.readouterr().out.splitlines()
+    assert lines.index(" from left_b0:") < lines.index(" from right_b0:")
+    assert "other joints: waist, rail" in lines
 
 
 def test_check_names_what_collides(capsys):

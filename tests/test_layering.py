@@ -12,11 +12,13 @@ PACKAGE = Path(jaxplan.__file__).parent
 
 # Each part may import itself and what stands in an earlier line.
 LAYERS = (
+    {"blocks", "interrupt", "process", "ranges"},
     {"config", "provenance", "pretrained"},
     {"scene", "planning", "trajectory", "diffusion", "data"},
     {"collision", "networks"},
-    {"samplers", "simulation", "motion"},
-    {"plan", "questions"},
+    {"samplers", "simulation", "motion", "pose"},
+    {"descent"},
+    {"ik", "plan", "questions"},
     {"reason"},
     {"planner"},
     {"tasks", "learning", "policies"},

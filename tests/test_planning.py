@@ -22,7 +22,15 @@ from planning_spheres import (
 
 from jaxplan.config import PAPER_PLANNER
 from jaxplan.planning import PlanResult, Segment, Status, lanes, make_planner, search
-from jaxplan.planning.edges import all_free, motions_free, points_for, stages
+from jaxplan.planning.edges import (
+    STAGES,
+    all_free,
+    motions_free,
+    place,
+    places,
+    points_for,
+)
+from jaxplan.planning.space import Space
 from jaxplan.planning.state import Query
 
 METHODS = ("rrt", "rrt_connect")
@@ -47,18 +55,21 @@ def planner(config, d=7):
 
 @cache
 def _grown(config, d):
-    limits = jnp.full(d, -Q_MAX), jnp.full(d, Q_MAX)
+    space = Space.of(np.full(d, -Q_MAX), np.full(d, Q_MAX), None, config.metric)
+    go, rounds = jnp.array(False), jnp.int32(2**30)
 
     @jax.jit
     def grow(worlds, state, query, status, bank):
         def free(problem, q):
             return config_free(worlds, problem, q)
 
-        return lanes.run(state, query, status, bank, free, limits, config)
+        return lanes.run(
+            state, query, status, bank, free, None, rounds, go, space, config
+        )
 
     def begin(query):
-        query, status = search.examine(query, limits)
-        return lanes.begin(query, status, len(status), config), query, status
+        query, status = search.examine(query, space)
+        return lanes.begin(query, status, len(status), space, config), query, status
 
     return jax.jit(begin), grow
 
@@ -67,7 +78,8 @@ def searched_trees(config, worlds, q_start, q_goal, q_toggle, keys, draw):
     """The answers, and the trees that led to them."""
     begin, grow = _grown(config, q_start.shape[1])
     ends = (jnp.asarray(q) for q in (q_start, q_goal, q_toggle))
-    query = Query(*ends, keys, jnp.full(len(keys), jnp.inf))
+    goals = jnp.zeros((len(keys), 0, q_start.shape[1]))
+    query = Query(*ends, keys, jnp.full(len(keys), jnp.inf), goals)
     state, query, status = begin(query)
     waiting = np.ones(len(q_start), bool)
     while waiting.any():
@@ -85,10 +97,14 @@ def assert_same_answers(a, b):
 
 @pytest.mark.parametrize("points", [1, 2, 3, 8, 32, 33])
 def test_stages_are_all_places_once_and_the_end_first(points):
-    groups = stages(points)
-    assert groups[0].tolist() == [1.0]
-    every = np.sort(np.concatenate(groups)) * points
-    np.testing.assert_allclose(every, np.arange(1, points + 1), rtol=1e-6)
+    many = jnp.int32(points)
+    groups = [
+        [int(place(jnp.int32(s), jnp.int32(i), many)) for i in range(count)]
+        for s in range(STAGES)
+        if (count := int(places(jnp.int32(s), many)))
+    ]
+    assert groups[0] == [points]
+    assert sorted(np.concatenate(groups)) == list(range(1, points + 1))
 
 
 @pytest.mark.parametrize("rows", [4, 64])
@@ -105,7 +121,7 @@ def test_staged_checks_give_the_verdicts_of_all_checks(rows):
 
     def check(q0, q1):
         return motions_free(
-            free, jnp.asarray(problem), q0, q1, jnp.asarray(asked), 10, rows
+            free, jnp.asarray(problem), q0, q1, jnp.asarray(10 * asked), rows
         )
 
     verdicts, checks = (np.asarray(x) for x in jax.jit(check)(q0, q1))
@@ -325,13 +341,16 @@ def assert_free(worlds, problem, q0, q1, config):
     """Motions of a problem are free where a planner looks, and no longer than a step."""
     # room for the rounding of a verdict that was computed by another program
     worlds = worlds._replace(radius=worlds.radius - 1e-5)
-    points = points_for(config.step_max, config.edge_resolution)
-    # both ways: edges of the goal's tree were checked from their other end
-    there, back = (
-        points_free(worlds, np.full(len(q0), problem), *ends, points)
-        for ends in ((q0, q1), (q1, q0))
-    )
-    assert np.all(there | back)
+    lengths = np.linalg.norm(np.float32(q1) - np.float32(q0), axis=-1)
+    points = np.array([points_for(x, config.edge_resolution) for x in lengths])
+    for count in np.unique(points):
+        same = points == count
+        # both ways: edges of the goal's tree were checked from their other end
+        there, back = (
+            points_free(worlds, np.full(same.sum(), problem), *ends, count)
+            for ends in ((q0[same], q1[same]), (q1[same], q0[same]))
+        )
+        assert np.all(there | back)
     assert np.all(np.linalg.norm(q1 - q0, axis=-1) <= config.step_max * 1.001)
 
 
@@ -507,7 +526,8 @@ def test_compiles_once():
         ({"p_uniform": 1.5}, "p_uniform 1.5"),
         ({"goal_tolerance": float("nan")}, "goal_tolerance nan"),
         ({"step_min": 0.3}, "0.3, 0.2"),
-        ({"metric": (1.0, 0.0)}, "7 positive"),
+        ({"metric": (1.0, 0.0)}, "more than 0"),
+        ({"metric": (1.0, 2.0)}, "7 weights"),
         ({"uniform_mode": "both"}, "'both'"),
     ],
 )

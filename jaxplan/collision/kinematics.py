@@ -5,14 +5,17 @@ into whatever uses it and computes the whole arm again for every sphere. The loo
 buffer is a wall that it does not cross.
 """
 
+import math
+from functools import reduce
 from itertools import groupby
+from typing import Any
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxplan.collision.world import World
-from jaxplan.scene import Link, Scene
+from jaxplan.collision.world import OWN_AXES, World, batch_shape
+from jaxplan.scene import Link, Scene, only_line
 from jaxplan.scene.dependent import follow
 
 
@@ -30,9 +33,9 @@ def link_poses(scene: Scene, world: World, q: jax.Array) -> jax.Array:
         world itself.
     """
     links = scene.structure.links
-    hand = scene.structure.link_of[scene.body_id(scene.hand)]
-    eye = jnp.eye(3, 4, dtype=q.dtype)[..., None]
-    fixed = jnp.broadcast_to(eye, (3, 4, q.shape[-1]))
+    fixed = jnp.broadcast_to(
+        jnp.eye(3, 4, dtype=q.dtype)[..., None], (3, 4, q.shape[-1])
+    )
     poses = jnp.zeros((1 + len(links), *fixed.shape), q.dtype).at[0].set(fixed)
     rows = range(1, len(links) + 1)
     for placed, run in groupby(rows, lambda row: links[row - 1].object >= 0):
@@ -43,9 +46,96 @@ def link_poses(scene: Scene, world: World, q: jax.Array) -> jax.Array:
             index = links[row - 1].object
             given = world.object_pose[index]
             local = jnp.concatenate([rotation_of(given[3:]), given[:3, None]], 1)
+            hand = scene.structure.link_of[scene.body_id(scene.hand)]
             base = jnp.where(world.held[index], poses[hand], fixed)
             poses = poses.at[row].set(_compose(base, local))
     return poses
+
+
+def frame_pose(scene: Scene, world: World, q: jax.Array, body: str) -> jax.Array:
+    """Pose of any body of the model, whether collision needs it or not.
+
+    Args:
+        scene: The scene.
+        world: Its leading axes broadcast against those of q.
+        q: `[..., d]` joints [rad or m].
+        body: Its name.
+
+    Returns:
+        `[..., 3, 4]` rotation and position [m] in the world.
+
+    Raises:
+        ValueError: There is no such body, or it hangs on a ball joint.
+    """
+    scene, world, q = in_float32((scene, world, q))
+    shape = batch_shape(world, q)
+
+    def flat(leaf: jax.Array, own: int) -> jax.Array:
+        tail = leaf.shape[leaf.ndim - own :]
+        rows = jnp.broadcast_to(leaf, (*shape, *tail)).reshape(math.prod(shape), *tail)
+        return jnp.moveaxis(rows, 0, -1)
+
+    leaves = World(*map(flat, world, OWN_AXES))
+    line = _line(scene, body)
+    poses = link_poses(line, leaves, flat(q, 1))
+    pose = poses[line.structure.link_of[scene.body_id(body)]]
+    return jnp.moveaxis(pose, -1, 0).reshape(*shape, 3, 4)
+
+
+def frame_jacobian(
+    scene: Scene, world: World, q: jax.Array, body: str
+) -> tuple[jax.Array, jax.Array]:
+    """A body's pose, and how the arm's joints move it.
+
+    Args:
+        scene: The scene.
+        world: Leaves with the batch last, as for `link_poses`.
+        q: `[d, B]` joints [rad or m].
+        body: Its name; nothing that the hand may hold.
+
+    Returns:
+        `[3, 4, B]` as `frame_pose`; `[6, d, B]` the velocity of the body's origin and its
+        angular velocity, in the world, by that of each joint (as `mj_jacBody`).
+    """
+    line, model = _line(scene, body), scene.model
+    above = scene.line(scene.body_id(body))
+    every = [
+        (row, link)
+        for row, link in enumerate(line.structure.links, 1)
+        if link.joint >= 0 and link.body in above
+    ]
+    rows, links = zip(*every, strict=True)
+    joint = np.array([link.joint for link in links])
+    slides = np.array([link.slides for link in links])[:, None, None]
+    poses = link_poses(line, world, q)
+    pose = poses[line.structure.link_of[scene.body_id(body)]]
+    moved = poses[np.array(rows)]
+    axis, anchor = (
+        sum(moved[:, :, k] * vectors[joint, k, None, None] for k in range(3))
+        for vectors in (model.jnt_axis, model.jnt_pos)
+    )
+    lever = pose[:, 3] - anchor - moved[:, :, 3]
+    linear = jnp.where(slides, axis, jnp.cross(axis, lever, axis=1))
+    motion = jnp.concatenate([linear, jnp.where(slides, 0, axis)], 1)
+
+    def speeds(direction: jax.Array) -> jax.Array:
+        along = jnp.broadcast_to(direction[:, None], q.shape)
+        return jax.jvp(lambda q: _values(line, world, q, links), (q,), (along,))[1]
+
+    speed = jax.vmap(speeds)(jnp.eye(len(q), dtype=q.dtype))
+    return pose, reduce(
+        jnp.add, (speed[:, i] * motion[i, :, None] for i in range(len(links)))
+    )
+
+
+def in_float32(tree: Any) -> Any:
+    """The arrays of a pytree in float32, whatever the caller computes in; flags stay."""
+
+    def cast(leaf: jax.typing.ArrayLike) -> jax.Array:
+        leaf = jnp.asarray(leaf)
+        return leaf if leaf.dtype == bool else leaf.astype(jnp.float32)
+
+    return jax.tree.map(cast, tree)
 
 
 def rotation_of(quat: jax.Array) -> jax.Array:
@@ -126,3 +216,8 @@ def _values(
     if dependent:
         moved = jnp.stack(follow(dependent, moved))
     return jnp.where(variable[:, None] >= 0, moved[variable], 0)
+
+
+def _line(scene: Scene, body: str) -> Scene:
+    """The scene with the links of one body's line only."""
+    return Scene(scene.model, only_line(scene.structure, scene.body_id(body)))

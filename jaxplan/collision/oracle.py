@@ -8,9 +8,11 @@ import mujoco
 import numpy as np
 import numpy.typing as npt
 
+from jaxplan.collision.checks import checked
 from jaxplan.collision.positions import carry, free_objects, qpos_rows
 from jaxplan.collision.replica import fill_slots, look_within, mujoco_model
 from jaxplan.collision.world import OWN_AXES, World, batch_shape
+from jaxplan.ranges import NotNegative, check
 from jaxplan.scene import Scene
 from jaxplan.scene.contacts import KINDS
 
@@ -32,6 +34,8 @@ def clearance_mujoco(
         q: `[..., d]` joints [rad].
         reach: How far pairs are looked for [m].
     """
+    world, q = checked(scene, world, q=q)
+    check("reach", reach, NotNegative)
     q = np.asarray(q, float)
     shape = batch_shape(world, q)
     rows = np.broadcast_to(q, (*shape, q.shape[-1])).reshape(-1, q.shape[-1])

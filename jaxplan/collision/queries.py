@@ -9,10 +9,13 @@ import numpy as np
 import numpy.typing as npt
 
 from jaxplan.collision.bounds import group_bounds, pair_reaches
+from jaxplan.collision.checks import checked
 from jaxplan.collision.engine import least_scores
 from jaxplan.collision.mjx_backend import least_distances
 from jaxplan.collision.narrow import Score
 from jaxplan.collision.world import OWN_AXES, World, batch_shape
+from jaxplan.process import refuse_fork
+from jaxplan.ranges import Count, NotNegative, Positive, check, numbers
 from jaxplan.scene import Scene
 
 Backend = Literal["fast", "mjx"]
@@ -42,6 +45,7 @@ def clearance(
         `[...]` [m], negative = penetration; NaN where q or the world is not finite, or a
         quaternion is zero.
     """
+    world, q = checked(scene, world, q=q)
     return _flat(scene, world, q, Score(exact=True), backend, motion)
 
 
@@ -67,6 +71,9 @@ def config_free(
     Returns:
         `[...]` bool.
     """
+    world, q = checked(scene, world, q=q)
+    if not isinstance(margin, jax.Array):
+        margin = numbers("margin", margin)
     score = Score(backend == "mjx", jnp.asarray(margin, jnp.float32))
     return _flat(scene, world, q, score, backend, motion) > 0
 
@@ -97,6 +104,8 @@ def motion_free(
     Returns:
         `[...]` bool.
     """
+    world, q0, q1 = checked(scene, world, q0=q0, q1=q1)
+    check("points", points, Count)
     share = (jnp.arange(points) + 1) / points
     q0, q1 = q0[..., None, :], q1[..., None, :]
     q = q0 + share[:, None] * (q1 - q0)
@@ -107,6 +116,8 @@ def motion_free(
 
 def points_for(length: float, resolution: float) -> int:
     """Configurations to check so that none of their gaps exceeds `resolution` [rad]."""
+    check("length", length, NotNegative)
+    check("resolution", resolution, Positive)
     return max(1, math.ceil(length / resolution - 1e-9))
 
 
@@ -174,6 +185,8 @@ def _flat(
     motion: jax.Array | None = None,
 ) -> jax.Array:
     """Asks the backend about the flattened batch."""
+    refuse_fork()
+    check("backend", backend, Backend)
     scene, world, q, motion = jax.tree.map(_single, (scene, world, q, motion))
     given = [q] if motion is None else [q, motion]
     shape, finite, flat, rows = _flatten(world, *given)

@@ -1,4 +1,4 @@
-"""Which contacts say nothing: bodies that touch wherever the arm is."""
+"""Which contacts that are checked are there wherever the arm is."""
 
 from collections import Counter
 
@@ -6,7 +6,8 @@ import numpy as np
 
 from jaxplan.collision.oracle import contacts_of
 from jaxplan.collision.world import make_world
-from jaxplan.scene import Group, Scene
+from jaxplan.ranges import Count, NotNegative, check
+from jaxplan.scene import Scene
 
 OFTEN = 0.9
 """Share of poses from which on a contact is taken for one that is always there."""
@@ -15,11 +16,10 @@ OFTEN = 0.9
 def always_touching(
     scene: Scene, samples: int = 200, tolerance: float = 1e-4
 ) -> list[tuple[str, float]]:
-    """Contact groups to exclude, or to ignore (`make_world`), by C MuJoCo.
+    """Contact groups that nearly no pose is free of, by C MuJoCo.
 
-    Bodies that touch in nearly every random pose leave nothing to plan, and neighbouring
-    links often do. Bodies with no joint of the arm between them, such as two fingers, are
-    listed whether they touch or not: no motion of the arm changes that.
+    What is safe to leave out by default is not among them (`exclude` of `Scene.from_mjcf`);
+    what is left may be excluded, or ignored (`make_world`), by who knows the robot.
 
     Args:
         scene: Its slots stay empty, its objects and passive joints at their reference.
@@ -29,6 +29,9 @@ def always_touching(
     Returns:
         (group, share of the poses in which its bodies touch), most frequent first.
     """
+    check("scene", scene, Scene)
+    check("samples", samples, Count)
+    check("tolerance", tolerance, NotNegative)
     world, q = make_world(scene), random_poses(scene, samples)
     table, touches = scene.group_table(), Counter()
     for distance, geoms in contacts_of(scene, world, q, tolerance):
@@ -37,8 +40,7 @@ def always_touching(
     shares = [
         (group.name, touches[index] / samples)
         for index, group in enumerate(scene.groups)
-        if not group.held
-        and (touches[index] > OFTEN * samples or not _arm_between(scene, group))
+        if not group.held and touches[index] > OFTEN * samples
     ]
     return sorted(shares, key=lambda pair: -pair[1])
 
@@ -49,9 +51,3 @@ def random_poses(scene: Scene, count: int, seed: int = 0) -> np.ndarray:
     low, high = (np.nan_to_num(x, posinf=np.pi, neginf=-np.pi) for x in limits)
     rng = np.random.default_rng(seed)
     return rng.uniform(low, high, (count, len(low))).astype(np.float32)
-
-
-def _arm_between(scene: Scene, group: Group) -> bool:
-    """Whether a joint of the arm moves one of the two bodies and not the other."""
-    lines = [set(scene.line(side.body)) for side in group.contacts[0]]
-    return bool(scene.arm_bodies & (lines[0] ^ lines[1]))

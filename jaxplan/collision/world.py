@@ -1,7 +1,7 @@
 """What changes between queries: where things are, what is held, what may touch."""
 
 from collections.abc import Iterable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -10,6 +10,8 @@ import numpy.typing as npt
 from jax.core import Tracer
 
 from jaxplan.collision.obstacles import Obstacle, fill
+from jaxplan.process import refuse_fork
+from jaxplan.ranges import check
 from jaxplan.scene import Scene
 from jaxplan.scene.names import known
 from jaxplan.scene.numbers import rotations
@@ -35,6 +37,10 @@ class World(NamedTuple):
     """`[..., n_slots, 7]` of the obstacles in the scene's slots."""
     slot_size: jax.Array
     """`[..., n_slots, 3]` their sizes as MuJoCo's [m]."""
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """A copy is in NumPy: so it can be read without JAX."""
+        return World, tuple(map(np.asarray, self))
 
 
 OWN_AXES = (2, 1, 1, 1, 2, 2)
@@ -64,6 +70,8 @@ def make_world(
             no sense; an array has the wrong shape; what is held is a mocap body, or the
             arm hangs on it.
     """
+    refuse_fork()
+    check("scene", scene, Scene)
     if object_pose is None:
         poses = [_reference_pose(scene, name) for name in scene.objects]
         object_pose = np.array(poses).reshape(-1, 7)

@@ -1,17 +1,28 @@
 """`jaxplan check`: what planning sees in a model, and what touches in a pose."""
 
 from collections import Counter
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
 from jaxplan.collision import always_touching, closest_pair
-from jaxplan.commands.model import Pose, default_pose, read_pose, read_scene, world_at
+from jaxplan.commands.model import (
+    Pose,
+    chains,
+    default_pose,
+    read_pose,
+    read_scene,
+    world_at,
+)
+from jaxplan.reason import with_unit
 from jaxplan.scene import Scene
 from jaxplan.scene.contacts import kind_of
 
 REACH = 0.5
 """How far C MuJoCo looks for what is closest [m]."""
+MANY = 8
+"""Joints of which more are listed by the chains that they are on."""
 SHOWN = 5
 """Pairs of bodies that are listed, besides those that collide."""
 
@@ -47,14 +58,18 @@ def check(
 
 def _show_scene(path: Path, scene: Scene) -> None:
     print(f"{path}: {len(scene.joints)} joints, hand {scene.hand!r}")
-    for name, low, high in zip(scene.joints, scene.q_min, scene.q_max, strict=True):
-        kind = scene.joint_kind(name)
-        unit = "rad" if kind == "hinge" else "m"
-        limits = f"{low:.4f} to {high:.4f} {unit}" if np.isfinite(low) else "no limits"
-        print(f"  {name}: {kind}, {limits}")
-    for title, names in (("other joints", scene.passive), ("objects", scene.objects)):
-        if names:
-            print(f"{title}: {', '.join(names)}")
+    q_min, q_max = np.asarray(scene.q_min), np.asarray(scene.q_max)
+    limits = dict(zip(scene.joints, np.stack([q_min, q_max], 1), strict=True))
+    for chain in chains(scene, scene.joints):
+        if len(scene.joints) > MANY:
+            print(f" from {chain.body}:")
+        for name in chain.joints:
+            print(f"  {name}: {_limits(scene, name, *limits[name])}")
+    _show_joints(scene, "other joints", scene.passive)
+    follow = getattr(scene, "dependent", ())
+    _show_joints(scene, "joints that follow others by an <equality>", follow)
+    if scene.objects:
+        print(f"objects: {', '.join(scene.objects)}")
     model = scene.mj_model
     touching = {
         geom
@@ -68,13 +83,34 @@ def _show_scene(path: Path, scene: Scene) -> None:
         counts = [f"{n} {kind}" for (c, kind), n in sorted(kinds.items()) if c == can]
         print(f"{title}: {', '.join(counts) or 'none'}")
     print(f"pairs: {len(scene.pairs)} of geoms, {len(scene.groups)} of bodies")
+    for a, b, why in getattr(scene, "excluded", ()):
+        print(f"pair left out: {a} and {b}, {why}")
+
+
+def _limits(scene: Scene, joint: str, low: float, high: float) -> str:
+    """A joint's kind, and how far it goes."""
+    kind = scene.joint_kind(joint)
+    if np.isfinite(low) or np.isfinite(high):
+        return f"{kind}, {low:.4f} to {with_unit(scene, joint, high)}"
+    return f"{kind}, no limits" + (", goes round" if kind == "hinge" else "")
+
+
+def _show_joints(scene: Scene, title: str, names: Sequence[str]) -> None:
+    """Names of joints in a line, or many of them in a line for each chain."""
+    if len(names) > MANY:
+        print(f"{title}:")
+        for chain in chains(scene, names):
+            print(f"  from {chain.body}: {', '.join(chain.joints)}")
+    elif names:
+        print(f"{title}: {', '.join(names)}")
 
 
 def _show_limits(scene: Scene, pose: Pose) -> bool:
     """Says which joints are out of their limits; whether none is."""
     over = (pose.q < np.asarray(scene.q_min)) | (pose.q > np.asarray(scene.q_max))
     for joint in np.flatnonzero(over):
-        print(f"out of limits: {scene.joints[joint]} at {pose.q[joint]:.4f}")
+        name = scene.joints[joint]
+        print(f"out of limits: {name} at {with_unit(scene, name, pose.q[joint])}")
     return not over.any()
 
 

@@ -1,5 +1,9 @@
 """A model and its poses as people name them on the command line."""
 
+from collections import Counter
+from collections.abc import Sequence
+from itertools import groupby
+from operator import itemgetter
 from pathlib import Path
 from typing import NamedTuple
 
@@ -9,6 +13,7 @@ from jaxplan import collision
 from jaxplan.collision import World, world_at_key
 from jaxplan.collision.positions import couple
 from jaxplan.scene import Scene
+from jaxplan.scene.chain import simple_joints
 from jaxplan.scene.names import known
 
 
@@ -71,6 +76,29 @@ def read_pose(scene: Scene, text: str, role: str) -> Pose:
             f"{role} is not finite: joint {scene.joints[joint]!r} is {q[joint]}"
         )
     return Pose(text, q, with_joints(scene, model.qpos0, q[None])[0])
+
+
+class Chain(NamedTuple):
+    """Joints one after the other, none of which has two after it but the last."""
+
+    body: str
+    """The first that moves."""
+    joints: list[str]
+
+
+def chains(scene: Scene, joints: Sequence[str]) -> list[Chain]:
+    """Joints by the chain of the kinematic tree that they are on, in their order."""
+    model, names = scene.mj_model, scene.structure.body_names
+    heads = [body for body in range(model.nbody) if simple_joints(model, body)]
+    above = {b: next((a for a in scene.line(b)[1:] if a in heads), 0) for b in heads}
+    branches = Counter(above.values())
+    first: dict[int, int] = {}
+    for body in heads:  # parents stand before children
+        up = above[body]
+        first[body] = first[up] if up and branches[up] == 1 else body
+    starts = [first[int(model.jnt_bodyid[scene.joint_id(name)])] for name in joints]
+    runs = groupby(zip(starts, joints, strict=True), key=itemgetter(0))
+    return [Chain(names[start], [name for _, name in run]) for start, run in runs]
 
 
 def default_pose(scene: Scene) -> Pose:

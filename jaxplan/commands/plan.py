@@ -13,8 +13,13 @@ from jaxplan.config import PlannerConfig
 from jaxplan.plan import Plan, Timed
 from jaxplan.planner import Planner
 from jaxplan.provenance import versions
+from jaxplan.reason import joint_distance
 from jaxplan.scene import Scene
+from jaxplan.simulation.camera import require_gl
 from jaxplan.simulation.video import FPS, film_motion
+
+RECORD, VIDEO = "plan.json", "plan.mp4"
+"""What is written; a file of these names that stands there is replaced or removed."""
 
 
 def plan(
@@ -50,14 +55,19 @@ def plan(
 
     Raises:
         ValueError: Bad input.
+        NoGLError: A video is wanted, and nothing can be rendered here.
     """
     if video and out is None:
         raise ValueError("--video needs --out")
     scene = read_scene(path, joints, hand)
     first, last = read_pose(scene, start, "start"), read_pose(scene, goal, "goal")
     planner = Planner(scene, config, velocity=velocity, acceleration=acceleration)
+    if video:
+        require_gl()
     if out is not None:
         out.mkdir(parents=True, exist_ok=True)
+        for name in (RECORD, VIDEO):  # of a run before
+            (out / name).unlink(missing_ok=True)
     world = world_at(scene, first)
     began = time.perf_counter()
     planner.plan(
@@ -68,7 +78,7 @@ def plan(
     )
     print(f"ready in {time.perf_counter() - began:.1f} s")
     answer = planner.plan(first.q, last.q, seed, world)
-    _show(answer)
+    _show(scene, answer)
     timed, certificates = None, {}
     if answer.solved:
         timed = planner.time(answer)
@@ -80,10 +90,10 @@ def plan(
     good = answer.solved and all(c.valid for c in certificates.values())
     if out is not None:
         record = _record(path, scene, (first, last), answer, timed, certificates)
-        (out / "plan.json").write_text(json.dumps(record, indent=1) + "\n")
-        written = [out / "plan.json"]
+        written = [out / RECORD]
+        written[0].write_text(json.dumps(record, indent=1) + "\n")
         if video and timed is not None:
-            written.append(out / "plan.mp4")
+            written.append(out / VIDEO)
             frames = np.arange(0, timed.t[-1] + 1 / FPS, 1 / FPS)
             q = np.stack([np.interp(frames, timed.t, joint) for joint in timed.q.T], -1)
             film_motion(written[1], scene.mj_model, with_joints(scene, first.qpos, q))
@@ -91,7 +101,7 @@ def plan(
     return good
 
 
-def _show(answer: Plan) -> None:
+def _show(scene: Scene, answer: Plan) -> None:
     status = answer.status.name.lower()
     print(f"{status}: {answer.reason}" if answer.reason else status)
     print(
@@ -99,7 +109,8 @@ def _show(answer: Plan) -> None:
         f"{answer.time:.3f} s"
     )
     if answer.solved:
-        print(f"path: {len(answer.path)} waypoints, {answer.length:.3f} rad")
+        length = joint_distance(scene, answer.length)
+        print(f"path: {len(answer.path)} waypoints, {length}")
 
 
 def _verdict(certificate: Certificate) -> str:

@@ -17,13 +17,13 @@ import jax
 import jax.numpy as jnp
 
 from jaxplan.planning.proposal import Draw
-from jaxplan.planning.segment import Limits
+from jaxplan.planning.space import Space
 from jaxplan.planning.state import Control, Query
 from jaxplan.planning.tree import Tree, at
 
 
 def informed(
-    draw: Draw, query: Query, side: jax.Array, limits: Limits
+    draw: Draw, query: Query, side: jax.Array, space: Space
 ) -> tuple[Draw, jax.Array]:
     """The draw with its sample inside the ellipsoid, and the most that the sample may cost.
 
@@ -31,7 +31,8 @@ def informed(
         draw: Random numbers of `[P, K]` workers.
         query: P problems.
         side: `[P, K]` the tree that moves.
-        limits: `(q_min [d], q_max [d])` [rad].
+        space: Of the configurations. Where joints come round there are many ways to the goal,
+            and no ellipsoid holds them all: the whole space is sampled then.
 
     Returns:
         The draw, and `[P, K]` a cost, counted from the root of the tree that moves.
@@ -39,7 +40,7 @@ def informed(
     start, goal = query.q_start[:, None], query.q_goal[:, None]
     d = start.shape[-1]
     # The uniform numbers that gave q_rand are free: the ellipsoid has its own.
-    uniform = (draw.q_rand - limits[0]) / (limits[1] - limits[0])
+    uniform = draw.uniform
     ball = draw.segment.direction * uniform[..., :1] ** (1 / d)
     gap = goal - start
     across = jnp.linalg.norm(gap, axis=-1, keepdims=True)
@@ -54,13 +55,15 @@ def informed(
     norm = jnp.maximum(jnp.sum(mirror**2, -1, keepdims=True), 1e-12)
     local = axes * ball
     turned = local - 2 * mirror * jnp.sum(mirror * local, -1, keepdims=True) / norm
-    inside = jnp.clip((start + goal) / 2 + turned, *limits)
+    inside = space.project((start + goal) / 2 + turned)
     narrow = jnp.isfinite(bound)
-    q_rand = jnp.where(narrow[..., None], inside, draw.q_rand)
+    q_rand = draw.q_rand
+    if not space.turns:
+        q_rand = jnp.where(narrow[..., None], inside, q_rand)
 
     own, other = _roots(query, side)
-    least = jnp.linalg.norm(q_rand - own, axis=-1)
-    room = bound - jnp.linalg.norm(q_rand - other, axis=-1) - least
+    least = space.distance(q_rand, own)
+    room = bound - space.distance(q_rand, other) - least
     share = uniform[..., min(1, d - 1)]
     most = jnp.where(narrow, least + share * room, jnp.inf)
     return draw._replace(q_rand=q_rand), most
@@ -73,6 +76,7 @@ def admits(
     control: Control,
     tree: Tree,
     query: Query,
+    space: Space,
 ) -> jax.Array:
     """`[P, K]` whether a path within the bound may lead through new nodes.
 
@@ -83,9 +87,10 @@ def admits(
         control: Of the workers.
         tree: Search trees.
         query: P problems.
+        space: Of the configurations.
     """
     _, other = _roots(query, control.side)
-    rest = jnp.linalg.norm(q_new - other, axis=-1)
+    rest = space.distance(q_new, other)
     meets = control.connecting & ~control.following & reached
     rest = jnp.where(meets, at(tree.cost, control.aim), rest)
     return cost + rest < query.bound[:, None]

@@ -10,7 +10,6 @@ from collections.abc import Callable
 
 import jax
 import jax.numpy as jnp
-import numpy as np
 
 ConfigFree = Callable[[jax.Array, jax.Array], jax.Array]
 """`(problem [R], q [R, d]) -> [R]` whether configurations are free, row r in the world of
@@ -18,21 +17,29 @@ problem `problem[r]`."""
 
 COARSE = 4
 """The second stage looks at the inner points of this many equal parts."""
+STAGES = 3
 
 
 def points_for(length: float, resolution: float) -> int:
     """Configurations to check so that none of their gaps exceeds `resolution` [rad]."""
-    return max(1, math.ceil(length / resolution - 1e-9))
+    return max(1, math.ceil(length / resolution - 1e-3))
 
 
-def stages(points: int) -> list[np.ndarray]:
-    """Shares of a motion in the order in which they are checked, all of (1..points)/points."""
-    every = np.arange(1, points + 1)
-    coarse = np.unique(np.arange(1, COARSE) * points // COARSE)
-    coarse = coarse[(coarse > 0) & (coarse < points)]
-    rest = np.setdiff1d(every[:-1], coarse)
-    groups = [every[-1:], coarse, rest]
-    return [group.astype(np.float32) / points for group in groups if len(group)]
+def places(stage: jax.Array, points: jax.Array) -> jax.Array:
+    """How many of a motion's `points [M]` places are checked in a stage."""
+    first, coarse = jnp.minimum(points, 1), jnp.clip(points - 1, 0, COARSE - 1)
+    rest = jnp.maximum(points - COARSE, 0)
+    return jnp.where(stage == 0, first, jnp.where(stage == 1, coarse, rest))
+
+
+def place(stage: jax.Array, index: jax.Array, points: jax.Array) -> jax.Array:
+    """The place, of 1 to `points [M]`, that a stage checks as its `index [M]`-th."""
+    few = points <= COARSE
+    coarse = jnp.where(few, index + 1, (index + 1) * points // COARSE)
+    rest = index + 1
+    for k in range(1, COARSE):  # those of the second stage are left out
+        rest = rest + (rest >= k * points // COARSE)
+    return jnp.where(stage == 0, points, jnp.where(stage == 1, coarse, rest))
 
 
 def motions_free(
@@ -40,52 +47,49 @@ def motions_free(
     problem: jax.Array,
     q0: jax.Array,
     q1: jax.Array,
-    asked: jax.Array,
-    points: int,
+    points: jax.Array,
     rows: int,
 ) -> tuple[jax.Array, jax.Array]:
-    """Checks straight motions at `points` even places, the end among them and the start not.
+    """Checks straight motions at even places, the end among them and the start not.
 
     Args:
         config_free: The check of configurations.
         problem: `[M]` whose world each motion is in.
         q0: `[M, d]` starts [rad].
         q1: `[M, d]` ends [rad].
-        asked: `[M]` which motions to check; the others come out as not free.
-        points: Checked configurations per motion.
+        points: `[M]` how many places of each motion to check; those with none come out as
+            not free.
         rows: Configurations of one call of `config_free`, about.
 
     Returns:
         `[M]` whether each motion is free, and `[M]` how many of its configurations were
         checked.
     """
-    groups = stages(points)
-    sizes = np.array([len(group) for group in groups], np.int32)
-    table = np.stack([np.resize(group, sizes.max()) for group in groups])
-    motions = asked.size
+    motions = points.size
 
     def stage(s: jax.Array, carry: tuple[jax.Array, jax.Array]):
         free, checks = carry
-        size = jnp.asarray(sizes)[s]
-        (index,) = jnp.nonzero(free, size=motions, fill_value=0)
-        total = jnp.sum(free, dtype=jnp.int32) * size
+        counts = jnp.where(free, places(s, points), 0)
+        ends = jnp.cumsum(counts)
 
         def block(i: jax.Array, free: jax.Array) -> jax.Array:
             row = i * rows + jnp.arange(rows, dtype=jnp.int32)
-            motion = index[jnp.minimum(row // size, motions - 1)]
-            share = jnp.asarray(table)[s, row % size][:, None]
-            start, end = q0[motion], q1[motion]
+            motion = jnp.sum(ends <= row[:, None], axis=1, dtype=jnp.int32)
+            motion = jnp.minimum(motion, motions - 1)
+            index = row - (ends - counts)[motion]
+            share = place(s, index, points[motion]) / jnp.maximum(points[motion], 1)
+            start, end, share = q0[motion], q1[motion], share[:, None]
             # The end itself, not what rounding makes of it.
             q = jnp.where(share == 1, end, start + share * (end - start))
-            blocked = (row < total) & ~config_free(problem[motion], q)
+            blocked = (row < ends[-1]) & ~config_free(problem[motion], q)
             return free.at[jnp.where(blocked, motion, motions)].set(False, mode="drop")
 
-        blocks = (total + rows - 1) // rows
-        return jax.lax.fori_loop(0, blocks, block, free), checks + free * size
+        blocks = (ends[-1] + rows - 1) // rows
+        return jax.lax.fori_loop(0, blocks, block, free), checks + counts
 
     # A loop over the stages, so that the check is compiled once.
-    nothing = jnp.zeros(asked.shape, jnp.int32)
-    return jax.lax.fori_loop(0, len(groups), stage, (asked, nothing))
+    nothing = jnp.zeros(points.shape, jnp.int32)
+    return jax.lax.fori_loop(0, STAGES, stage, (points > 0, nothing))
 
 
 def all_free(

@@ -8,10 +8,11 @@ hardest; here every lane is busy until the queue is empty, in one compiled loop:
     round     every lane goes on with its problem (`search.advance`)
 
 A path whose dense check fails is not an answer: its problem starts anew in its lane, with
-other random numbers and what is left of its budget. So does, under a bound, a problem that
-is to have a shorter path (`bounded`).
+other random numbers, checks twice as fine, and what is left of its budget. So does, under
+a bound, a problem that is to have a shorter path (`bounded`).
 """
 
+from functools import partial
 from typing import NamedTuple
 
 import jax
@@ -21,11 +22,15 @@ from jaxplan.config import PlannerConfig
 from jaxplan.planning import search
 from jaxplan.planning.edges import ConfigFree, all_free
 from jaxplan.planning.result import PlanResult, Status
-from jaxplan.planning.segment import Limits, Segment
+from jaxplan.planning.segment import Segment
+from jaxplan.planning.space import Space
 from jaxplan.planning.state import Query, State, searching
+from jaxplan.planning.sweep import SweptFree, sweep
 
 SHORTER = 0.999
 """A search for a shorter path looks for one that is shorter by this factor at least."""
+PIECE = 1 / 16
+"""Of a path that is to be proven free [rad]."""
 
 
 class Lanes(NamedTuple):
@@ -43,20 +48,24 @@ class Lanes(NamedTuple):
     """Of the problems; what is not over yet is empty."""
 
 
-def begin(query: Query, status: jax.Array, lanes: int, config: PlannerConfig) -> Lanes:
+def begin(
+    query: Query, status: jax.Array, lanes: int, space: Space, config: PlannerConfig
+) -> Lanes:
     """Loads the first L of P problems.
 
     Args:
         query: P problems.
         status: `[P]` from `search.examine`.
         lanes: L, at most P.
+        space: Of the configurations.
         config: Planner settings.
     """
     problem = jnp.arange(lanes, dtype=jnp.int32)
     problems, d = query.q_start.shape
-    state = search.empty(lanes, d, query.key[:lanes], config)
+    first = jax.tree.map(lambda leaf: leaf[:lanes], query)
+    state = search.empty(first, space, config)
     every = jnp.ones(lanes, bool)
-    state = search.start(state, every, *_load(query, status, problem), config)
+    state = search.start(state, every, *_load(query, status, problem), space, config)
     zero = jnp.zeros(problems, jnp.int32)
     answers = PlanResult(
         path=jnp.zeros((problems, search.waypoints(config), d)),
@@ -66,6 +75,7 @@ def begin(query: Query, status: jax.Array, lanes: int, config: PlannerConfig) ->
         accepted=zero,
         learned=zero,
         checks=zero,
+        nodes=jnp.zeros((problems, 2), jnp.int32),
     )
     return Lanes(state, problem, every, jnp.int32(lanes), answers)
 
@@ -76,7 +86,10 @@ def run(
     status: jax.Array,
     bank: Segment | None,
     config_free: ConfigFree,
-    limits: Limits,
+    swept_free: SweptFree | None,
+    rounds: jax.Array,
+    stop: jax.Array,
+    space: Space,
     config: PlannerConfig,
 ) -> Lanes:
     """Goes on until all problems are answered or wait for more learned segments.
@@ -87,21 +100,38 @@ def run(
         status: `[P]` from `search.examine`.
         bank: As for `search.advance`, of the lanes.
         config_free: The check of configurations; `problem` counts the P problems.
-        limits: `(q_min [d], q_max [d])` [rad].
+        swept_free: Proves configurations and what is near to them; None: paths are checked
+            at samples.
+        rounds: How many at most; the search goes on with the next call.
+        stop: All that is not solved now is given up.
+        space: Of the configurations.
         config: Planner settings.
     """
     problems = len(status)
 
+    def going(lanes: Lanes) -> jax.Array:
+        return searching(lanes.state, config) & ~stop
+
     def able(lanes: Lanes) -> jax.Array:
-        return searching(lanes.state, config) & ~lanes.state.waiting & ~lanes.fresh
+        return going(lanes) & ~lanes.state.waiting & ~lanes.fresh
 
     def due(lanes: Lanes) -> jax.Array:
-        over = lanes.fresh | ~searching(lanes.state, config)
-        return over & (lanes.problem < problems)
+        return (lanes.fresh | ~going(lanes)) & (lanes.problem < problems)
 
-    def turn(lanes: Lanes) -> Lanes:
+    def turn(carry: tuple[jax.Array, Lanes]) -> tuple[jax.Array, Lanes]:
+        number, lanes = carry
+
         def harvest(lanes: Lanes) -> Lanes:
-            return _harvest(lanes, due(lanes), query, status, config_free, config)
+            return _harvest(
+                lanes,
+                due(lanes),
+                query,
+                status,
+                (config_free, swept_free),
+                stop,
+                space,
+                config,
+            )
 
         lanes = jax.lax.cond(jnp.any(due(lanes)), harvest, lambda same: same, lanes)
         here = jnp.minimum(lanes.problem, problems - 1)
@@ -109,15 +139,16 @@ def run(
         def free(lane: jax.Array, q: jax.Array) -> jax.Array:
             return config_free(here[lane], q)
 
-        state = search.advance(lanes.state, able(lanes), bank, free, limits, config)
-        return lanes._replace(state=state)
+        state = search.advance(lanes.state, able(lanes), bank, free, space, config)
+        return number + 1, lanes._replace(state=state)
+
+    def more(carry: tuple[jax.Array, Lanes]) -> jax.Array:
+        number, lanes = carry
+        return (number < rounds) & jnp.any(able(lanes) | due(lanes))
 
     state = lanes.state._replace(waiting=jnp.zeros_like(lanes.state.waiting))
-    return jax.lax.while_loop(
-        lambda lanes: jnp.any(able(lanes) | due(lanes)),
-        turn,
-        lanes._replace(state=state),
-    )
+    first = jnp.int32(0), lanes._replace(state=state)
+    return jax.lax.while_loop(more, turn, first)[1]
 
 
 def _load(
@@ -134,17 +165,17 @@ def _harvest(
     due: jax.Array,
     query: Query,
     status: jax.Array,
-    config_free: ConfigFree,
+    checks: tuple[ConfigFree, SweptFree | None],
+    stop: jax.Array,
+    space: Space,
     config: PlannerConfig,
 ) -> Lanes:
     """Looks after the lanes that are `due [L]`: a new question, or an answer to write down."""
     state, problems = lanes.state, len(status)
-    found = search.finish(state, config)
+    found = search.finish(state, space, config)
     opening = due & lanes.fresh & (state.status == Status.BUDGET_EXHAUSTED)
     solved = due & ~lanes.fresh & (found.status == Status.SOLVED)
-    sound, start_free, goal_free = _check(
-        lanes, found, opening, solved, config_free, config
-    )
+    sound, start_free, goal_free = _check(lanes, found, opening, solved, checks, config)
     opened = jnp.where(goal_free, state.status, Status.GOAL_IN_COLLISION)
     opened = jnp.where(start_free, opened, Status.START_IN_COLLISION)
     state = state._replace(status=opened.astype(jnp.int32))
@@ -152,13 +183,13 @@ def _harvest(
         status=jnp.where(sound, found.status, Status.BUDGET_EXHAUSTED),
         path_length=jnp.where(sound, found.path_length, 1),
     )
-    more = state.expansions < config.max_expansions
+    more = (state.expansions < config.max_expansions) & ~stop
     anew, bound = ~sound & more, state.query.bound
     if search.optimises(config):
         # Until the budget is used, or the path is straight.
         gaps = jnp.linalg.norm(found.path[:, 1:] - found.path[:, :-1], axis=-1)
         bound = jnp.where(solved & sound, SHORTER * jnp.sum(gaps, axis=1), bound)
-        straight = jnp.linalg.norm(state.query.q_goal - state.query.q_start, axis=-1)
+        straight = space.distance(state.query.q_start, state.query.q_goal)
         anew |= solved & more & (bound > straight)
     done = due & ~lanes.fresh & ~anew
     answers = _write(
@@ -170,9 +201,10 @@ def _harvest(
     begins = loaded | anew
     asked, known = _load(query, status, problem)
     asked = asked._replace(bound=jnp.where(anew, bound, jnp.inf))
-    state = search.start(state, begins, asked, known, config)
+    state = search.start(state, begins, asked, known, space, config)
     # A new attempt goes on counting, and so draws other random numbers.
-    for name in ("chunk", "used", "expansions", "accepted", "checks"):
+    state = state._replace(attempt=state.attempt + (anew & ~sound))
+    for name in ("chunk", "used", "expansions", "accepted", "checks", "attempt"):
         count = jnp.where(loaded, 0, getattr(state, name))
         state = state._replace(**{name: count})
     return Lanes(
@@ -210,14 +242,16 @@ def _check(
     found: PlanResult,
     opening: jax.Array,
     solved: jax.Array,
-    config_free: ConfigFree,
+    checks: tuple[ConfigFree, SweptFree | None],
     config: PlannerConfig,
 ) -> tuple[jax.Array, jax.Array, jax.Array]:
     """`[L]` each: path sound if `solved`, start and goal free if `opening`. One pass for all."""
+    config_free, swept_free = checks
     count, waypoints, d = found.path.shape
     dense = config.path_resolution > 0
     gaps = jnp.linalg.norm(found.path[:, 1:] - found.path[:, :-1], axis=-1)
-    places = jnp.ceil(gaps / config.path_resolution) if dense else 0 * gaps
+    spacing = config.path_resolution if swept_free is None else PIECE
+    places = jnp.ceil(gaps / spacing) if dense else 0 * gaps
     edge = jnp.arange(waypoints - 1)
     counts = jnp.where(
         solved[:, None] & (edge < found.path_length[:, None] - 1) & dense,
@@ -226,8 +260,10 @@ def _check(
     )
     lane = jnp.arange(count, dtype=jnp.int32)
     ends = jnp.concatenate(lanes.state.query[:2])
-    free = all_free(
-        config_free,
+    check = partial(all_free, config_free)
+    if swept_free is not None:
+        check = partial(sweep, swept_free)
+    free = check(
         lanes.problem[jnp.concatenate([jnp.repeat(lane, waypoints - 1), lane, lane])],
         jnp.concatenate([found.path[:, :-1].reshape(-1, d), ends]),
         jnp.concatenate([found.path[:, 1:].reshape(-1, d), ends]),

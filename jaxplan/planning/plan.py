@@ -6,9 +6,13 @@
 Everything compiles once for a batch size P and a bank size M. `worlds` is an argument of the
 compiled pieces, so a world may change from call to call; a batch that is short of problems is
 padded and `active` says which lanes are real.
+
+A search runs in slices of a fraction of a second, so that it can be stopped in between: by
+a time limit, by the caller, or by Ctrl-C. How it is sliced changes nothing in the answer.
 """
 
 import math
+import time
 from collections.abc import Callable
 from typing import Any
 
@@ -21,9 +25,17 @@ from jaxplan.config import PlannerConfig
 from jaxplan.planning import lanes, search
 from jaxplan.planning.result import PlanResult, Status
 from jaxplan.planning.segment import Segment
+from jaxplan.planning.settings import check_settings
+from jaxplan.planning.space import Space
 from jaxplan.planning.state import Query
 
 Worlds = Any
+FIRST_SLICE = 32
+"""Rounds of a search before anything is known of how long they take."""
+SLICE = 0.1
+"""How long a slice is to take [s]."""
+LAST_SLICE = 0.02
+"""The same where a time limit is near [s]."""
 
 
 def make_planner(
@@ -31,7 +43,9 @@ def make_planner(
     config: PlannerConfig,
     q_min: ArrayLike,
     q_max: ArrayLike,
-    jit: Callable[[Callable], Callable] = jax.jit,
+    jit: Callable[..., Callable] = jax.jit,
+    circular: ArrayLike | None = None,
+    swept_free: Callable[..., jax.Array] | None = None,
 ) -> Callable[..., PlanResult]:
     """Builds a planner for batches of problems.
 
@@ -39,23 +53,33 @@ def make_planner(
         config_free: `(worlds, problem [R], q [R, d]) -> [R]`: whether configurations are
             free, row r in the world of problem `problem[r]`.
         config: Planner settings.
-        q_min: `[d]` lower joint limits [rad].
-        q_max: `[d]` upper joint limits [rad].
+        q_min: `[d]` lower joint limits [rad], -inf where there is none.
+        q_max: `[d]` upper joint limits [rad], inf where there is none.
         jit: Compiles the pieces; give compiler options here.
+        circular: `[d]` joints that come round: q and q + 2 pi are the same. A path turns
+            on through them, and ends at q_goal or some turns from it.
+        swept_free: `(worlds, problem [R], q [R, d], motion [R, d]) -> [R]`: whether all
+            configurations within `motion` of q, joint by joint, are proven free. With it
+            the path that is found is free all along, not at samples only.
 
     Returns:
         `plan(worlds, q_start [P, d], q_goal [P, d], q_toggle [P, d], keys [P], draw=None,
-        active=None) -> PlanResult`. `draw(chunk [P]) -> Segment [P, M]` gives the learned
-        segments `chunk * M` to `chunk * M + M - 1` of each problem; without it all
-        proposals are uniform. It is asked when a search asks for a segment (the very first
-        call also asks to see how large M is). `active [P]` is false for padding lanes.
+        active=None, goals=None, time_limit=inf, stopped=None) -> PlanResult`.
+        `draw(chunk [P]) -> Segment [P, M]` gives the learned segments `chunk * M` to
+        `chunk * M + M - 1` of each problem; without it all proposals are uniform. It is
+        asked when a search asks for a segment (the very first call also asks to see how
+        large M is). `active [P]` is false for padding lanes. `goals [P, G - 1, d]` are as
+        good as q_goal (`rrt_connect` only). What is not solved after `time_limit` [s], or
+        when `stopped()` says so, is TIME_OUT.
 
     Raises:
         ValueError: A setting or a limit that makes no sense, or arrays of the wrong shape.
     """
-    q_min, q_max = np.asarray(q_min, np.float32), np.asarray(q_max, np.float32)
-    _check_settings(config, q_min, q_max)
-    d = q_min.size
+    space = Space.of(q_min, q_max, circular, config.metric)
+    d = space.q_min.size
+    check_settings(config, d)
+    pace = math.inf
+    """How long a round took in the last slice [s]."""
 
     def run(
         worlds: Worlds,
@@ -63,73 +87,121 @@ def make_planner(
         query: Query,
         status: jax.Array,
         bank: Segment | None,
+        rounds: jax.Array,
+        stop: jax.Array,
     ) -> lanes.Lanes:
         def free(problem, q):
             return config_free(worlds, problem, q)
 
-        return lanes.run(state, query, status, bank, free, _limits(), config)
+        def swept(problem, q, motion):
+            assert swept_free is not None
+            return swept_free(worlds, problem, q, motion)
 
-    def begin(query: Query, active: jax.Array, count: int):
-        query, status = search.examine(query, _limits())
+        proof = None if swept_free is None else swept
+        return lanes.run(
+            state, query, status, bank, free, proof, rounds, stop, space, config
+        )
+
+    @jit
+    def begin(query: Query, active: jax.Array, bank: Segment | None):
+        query, status = search.examine(query, space)
         status = jnp.where(active, status, Status.INACTIVE).astype(jnp.int32)
-        return lanes.begin(query, status, count, config), query, status
-
-    @jit
-    def uniform(worlds: Worlds, query: Query, active: jax.Array) -> PlanResult:
-        """The whole search in one program."""
-        count = min(len(active), config.lanes)
-        state, query, status = begin(query, active, count)
-        return run(worlds, state, query, status, None).answers
-
-    @jit
-    def start(query: Query, active: jax.Array):
+        count = len(active)
+        if bank is None:
+            return lanes.begin(
+                query, status, min(count, config.lanes), space, config
+            ), query, status  # fmt: skip
         # A lane for each problem: the sampler's banks are by problem. There is none yet.
-        state, query, status = begin(query, active, len(active))
+        state = lanes.begin(query, status, count, space, config)
         chunk = jnp.full_like(state.state.chunk, -1)
         return state._replace(state=state.state._replace(chunk=chunk)), query, status
 
-    guided = jit(run)
+    advance = jit(run, donate_argnums=1)
     rows: list[int] = []
     """M, once a bank was seen."""
 
-    def _limits():
-        return jnp.asarray(q_min), jnp.asarray(q_max)
-
-    def plan(
-        worlds: Worlds, q_start, q_goal, q_toggle, keys, draw=None, active=None
-    ) -> PlanResult:
-        unbounded: Any = np.full(len(keys), np.inf, np.float32)
-        query = Query(
-            _batch(q_start, d, "q_start"),
-            _batch(q_goal, d, "q_goal"),
-            _batch(q_toggle, d, "q_toggle"),
-            keys,
-            unbounded,
-        )
-        problems = len(query.q_start)
-        if {len(q) for q in query} != {problems}:
-            sizes = [len(q) for q in query[:4]]
-            raise ValueError(f"q_start, q_goal, q_toggle, keys have lengths {sizes}")
-        active = np.ones(problems, bool) if active is None else np.asarray(active, bool)
+    def first_bank(draw: Callable[[jax.Array], Segment] | None, problems: int) -> Any:
+        """A bank that nobody reads: whoever asks for a segment waits for the first one."""
         if draw is None or config.p_uniform >= 1:
-            return uniform(worlds, query, active)
-        state, query, status = start(query, active)
+            return None
         if not rows:
             rows.append(draw(jnp.zeros(problems, jnp.int32)).length.shape[1])
         if rows[0] < config.workers:
             raise ValueError(
                 f"a bank of {rows[0]} segments for {config.workers} workers"
             )
-        # Nobody reads it: whoever asks for a segment waits for the first bank.
         shape = problems, rows[0]
-        bank = Segment(jnp.zeros((*shape, d)), jnp.zeros(shape))
+        return Segment(jnp.zeros((*shape, d)), jnp.zeros(shape))
+
+    def plan(
+        worlds: Worlds,
+        q_start,
+        q_goal,
+        q_toggle,
+        keys,
+        draw=None,
+        active=None,
+        goals=None,
+        time_limit: float = math.inf,
+        stopped: Callable[[], bool] | None = None,
+    ) -> PlanResult:
+        nonlocal pace
+        end = time.perf_counter() + time_limit
+        query = _query(q_start, q_goal, q_toggle, keys, goals, d)
+        problems = len(query.q_start)
+        if query.goals.shape[1] and config.method != "rrt_connect":
+            raise ValueError(f"{config.method} has one goal; several need rrt_connect")
+        active = np.ones(problems, bool) if active is None else np.asarray(active, bool)
+        bank = first_bank(draw, problems)
+        state, query, status = begin(query, active, bank)
+        go, halt = np.False_, np.True_
         while True:
-            state = guided(worlds, state, query, status, bank)
-            if not np.asarray(state.state.waiting).any():
+            began = time.perf_counter()
+            left = end - began
+            wanted = SLICE if left > 2 * SLICE else min(LAST_SLICE, left / 2)
+            rounds = FIRST_SLICE if math.isinf(pace) else wanted / pace
+            rounds = np.int32(np.clip(rounds, 1, 2**30))
+            state = advance(worlds, state, query, status, bank, rounds, go)
+            problem = np.asarray(state.problem)
+            open_ = problem < problems
+            if not open_.any():
                 return state.answers
-            bank = draw(state.state.chunk)
+            if np.asarray(state.state.waiting).any():
+                assert draw is not None
+                bank = draw(state.state.chunk)
+            now = time.perf_counter()
+            pace = max((now - began) / rounds, 1e-7)
+            if now >= end or (stopped is not None and stopped()):
+                break
+        late = np.zeros(problems, bool)
+        late[problem[open_]] = late[int(state.taken) :] = True
+        last = np.int32(2**30)
+        answers = advance(worlds, state, query, status, bank, last, halt).answers
+        late &= np.asarray(answers.status) == Status.BUDGET_EXHAUSTED
+        status = jnp.where(late, Status.TIME_OUT, answers.status)
+        return answers._replace(status=status.astype(jnp.int32))
 
     return plan
+
+
+def _query(q_start, q_goal, q_toggle, keys, goals, d: int) -> Query:
+    """The questions, checked."""
+    unbounded: Any = np.full(len(keys), np.inf, np.float32)
+    query = Query(
+        _batch(q_start, d, "q_start"),
+        _batch(q_goal, d, "q_goal"),
+        _batch(q_toggle, d, "q_toggle"),
+        keys,
+        unbounded,
+        np.zeros((len(keys), 0, d), np.float32)  # type: ignore[arg-type]
+        if goals is None
+        else np.asarray(goals, np.float32),
+    )
+    problems = len(query.q_start)
+    if {len(q) for q in query} != {problems}:
+        sizes = [len(q) for q in query[:4]]
+        raise ValueError(f"q_start, q_goal, q_toggle, keys have lengths {sizes}")
+    return query
 
 
 def _batch(q, d: int, name: str) -> Any:
@@ -137,51 +209,3 @@ def _batch(q, d: int, name: str) -> Any:
     if q.ndim != 2 or q.shape[1] != d:
         raise ValueError(f"{name} has shape {q.shape}, expected (problems, {d})")
     return q
-
-
-def _check_settings(
-    config: PlannerConfig, q_min: np.ndarray, q_max: np.ndarray
-) -> None:
-    """Refuses settings under which the search would be wrong without a word."""
-    if q_min.ndim != 1 or q_min.shape != q_max.shape or not np.all(q_min < q_max):
-        raise ValueError(
-            f"joint limits must be finite with q_min < q_max: {q_min} {q_max}"
-        )
-    if not (np.isfinite(q_min).all() and np.isfinite(q_max).all()):
-        raise ValueError(
-            f"joint limits must be finite with q_min < q_max: {q_min} {q_max}"
-        )
-    if config.method not in search.METHODS:
-        raise ValueError(f"method {config.method!r}, expected {sorted(search.METHODS)}")
-    if search.optimises(config):
-        if config.toggle_tie_break > 0 or config.metric is not None:
-            raise ValueError("ao_rrt_connect has no toggle_tie_break and no metric")
-        if config.uniform_mode != "toward":
-            raise ValueError("ao_rrt_connect needs uniform_mode 'toward'")
-    if config.uniform_mode not in ("toward", "independent"):
-        raise ValueError(f"uniform_mode {config.uniform_mode!r}: toward or independent")
-    if config.goal_tree not in ("mirrored", "uniform"):
-        raise ValueError(f"goal_tree {config.goal_tree!r}: mirrored or uniform")
-    for name in ("max_expansions", "workers", "lanes", "check_rows"):
-        if getattr(config, name) < 1:
-            raise ValueError(f"{name} {getattr(config, name)}, expected at least 1")
-    for name in ("p_uniform", "goal_bias"):
-        if not 0 <= getattr(config, name) <= 1:
-            raise ValueError(f"{name} {getattr(config, name)}, expected 0 to 1")
-    for name in (
-        "goal_tolerance",
-        "goal_connect",
-        "toggle_tie_break",
-        "path_resolution",
-    ):
-        if not 0 <= getattr(config, name) < math.inf:
-            raise ValueError(f"{name} {getattr(config, name)}, expected 0 or more")
-    if not 0 < config.step_min <= config.step_max < math.inf:
-        steps = f"{config.step_min}, {config.step_max}"
-        raise ValueError(f"step_min, step_max {steps}, expected 0 < min <= max")
-    if config.metric is not None and (
-        len(config.metric) != q_min.size or not min(config.metric) > 0
-    ):
-        raise ValueError(
-            f"metric {config.metric}, expected {q_min.size} positive weights"
-        )

@@ -11,7 +11,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxplan.config import PlannerConfig
-from jaxplan.planning.segment import Limits, Proposal, Segment, usable
+from jaxplan.planning.segment import Proposal, Segment, usable
 
 
 class Draw(NamedTuple):
@@ -21,8 +21,12 @@ class Draw(NamedTuple):
     """`[P, K]` use_learned: ask the sampler."""
     goal: jax.Array
     """`[P, K]` a uniform proposal goes straight toward the goal instead."""
+    uniform: jax.Array
+    """`[P, K, d]` in (0, 1): where q_rand lies in the box."""
     q_rand: jax.Array
-    """`[P, K, d]` uniform within the limits [rad]."""
+    """`[P, K, d]` uniform within the box that is sampled [rad]."""
+    share: jax.Array
+    """`[P, K]` in (0, 1): the segment's length among those that there are."""
     segment: Segment
     """UniformSegment: direction uniform on the sphere, length in [step_min, step_max]."""
 
@@ -30,12 +34,19 @@ class Draw(NamedTuple):
 def draw_numbers(
     keys: jax.Array,
     expansion: jax.Array,
-    limits: Limits,
+    box: tuple[jax.Array, jax.Array],
     config: PlannerConfig,
 ) -> Draw:
-    """The random numbers of expansions `[P, K]` of the problems with keys `[P]`."""
-    q_min, q_max = limits
-    d = q_min.size
+    """The random numbers of expansions `[P, K]` of the problems with keys `[P]`.
+
+    Args:
+        keys: `[P]` typed.
+        expansion: `[P, K]` their numbers.
+        box: Corners `[d]` or `[P, 1, d]` of what is sampled.
+        config: Planner settings.
+    """
+    low, high = box
+    d = low.shape[-1]
 
     def one(key, k):
         return jax.random.bits(jax.random.fold_in(key, k), (3 + 2 * d,))
@@ -47,7 +58,9 @@ def draw_numbers(
     return Draw(
         learned=uniform[..., 0] >= config.p_uniform,
         goal=uniform[..., 1] < config.goal_bias,
-        q_rand=q_min + uniform[..., 3 : 3 + d] * (q_max - q_min),
+        uniform=uniform[..., 3 : 3 + d],
+        q_rand=low + uniform[..., 3 : 3 + d] * (high - low),
+        share=uniform[..., 2],
         segment=Segment(
             normal / jnp.linalg.norm(normal, axis=-1, keepdims=True), length
         ),

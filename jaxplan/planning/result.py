@@ -20,6 +20,10 @@ class Status(IntEnum):
     """q_start, q_goal or q_toggle is not finite."""
     INACTIVE = 6
     """A padding lane of the batch: nothing was asked."""
+    TIME_OUT = 7
+    """The time limit came first; the path leads to the best node reached."""
+    GOAL_UNREACHABLE = 8
+    """No configuration within the limits brings the body to the pose."""
 
 
 class PlanResult(NamedTuple):
@@ -39,3 +43,5 @@ class PlanResult(NamedTuple):
     """`[P]` learned segments drawn from the bank."""
     checks: jax.Array
     """`[P]` configurations of motions that were checked."""
+    nodes: jax.Array
+    """`[P, 2]` nodes of the start's tree and of the goal's, their roots included."""

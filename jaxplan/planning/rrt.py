@@ -13,8 +13,9 @@ import jax.numpy as jnp
 from jaxplan.config import PlannerConfig
 from jaxplan.planning.proposal import Draw, mixture
 from jaxplan.planning.segment import Segment, straightened
+from jaxplan.planning.space import Space
 from jaxplan.planning.state import Control, Move, Outcome, Query
-from jaxplan.planning.tree import Tree, distance, nearest
+from jaxplan.planning.tree import Tree, nearest
 
 
 def roots(query: Query) -> jax.Array:
@@ -22,11 +23,11 @@ def roots(query: Query) -> jax.Array:
     return query.q_start[:, None]
 
 
-def begin(query: Query, config: PlannerConfig) -> Control:
+def begin(query: Query, space: Space, config: PlannerConfig) -> Control:
     """The root is the first accepted node, and the first worker's."""
     shape = len(query.q_start), config.workers
     zero, first = jnp.zeros(shape, jnp.int32), jnp.arange(config.workers) == 0
-    gap = distance(query.q_start, query.q_goal, config.metric)[:, None]
+    gap = space.distance(query.q_start, query.q_goal)[:, None]
     connecting = first & (gap > 0) & (gap <= config.goal_connect)
     solved = first & ~connecting & (gap <= config.goal_tolerance)
     no = jnp.zeros(shape, bool)
@@ -56,12 +57,18 @@ def propose(
 
 
 def advance(
-    control: Control, outcome: Outcome, query: Query, config: PlannerConfig
+    control: Control,
+    outcome: Outcome,
+    query: Query,
+    tree: Tree,
+    space: Space,
+    config: PlannerConfig,
 ) -> Control:
     """What follows an accepted or a rejected move."""
+    del tree
     ok, q_goal = outcome.accepted, query.q_goal[:, None]
-    gap_new = distance(outcome.q_new, q_goal, config.metric)
-    gap_base = distance(outcome.q_base, q_goal, config.metric)
+    gap_new = space.distance(outcome.q_new, q_goal)
+    gap_base = space.distance(outcome.q_base, q_goal)
     was = control.connecting & ~control.following
     close = was | (gap_new <= config.goal_connect)
     connecting = ok & close & (gap_new > 0)
@@ -79,9 +86,9 @@ def advance(
 
 
 def ends(
-    tree: Tree, control: Control, query: Query, config: PlannerConfig
+    tree: Tree, control: Control, query: Query, space: Space
 ) -> tuple[jax.Array, jax.Array]:
     """The best node reached, q_reach, and no second tree to go on in; `[P]` each."""
     side = jnp.zeros_like(control.side[:, :1])
-    best = nearest(tree, side, query.q_goal[:, None], config.metric)[0][:, 0]
+    best = nearest(tree, side, query.q_goal[:, None], space)[0][:, 0]
     return best, jnp.full_like(best, -1)

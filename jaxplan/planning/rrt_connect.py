@@ -1,15 +1,17 @@
 """RRT-Connect with segments: two trees that grow in turn and run at each other.
 
-    grow:     a proposal of the mixture in tree `side`; accepted -> connect, else swap
+    grow:     a proposal of the mixture in tree `side`; accepted -> connect, else grow
     follow:   straight steps on to the end of a learned segment that has a base, or to any
               sample if `greedy`; there or blocked -> connect
-    connect:  straight steps of the other tree to the new node; blocked -> that tree grows
+    connect:  straight steps of the other tree to the new node; blocked -> grow
     solved:   the two trees meet
 
 This is what one worker does; several of them share the trees. The start's tree grows as
 in Algorithm 1. The goal's tree mirrors it: base nearest to q_start, learned directions
 reversed, since the sampler knows paths from start to goal only. The first thing that the
-first worker tries is the straight motion from q_start to q_goal.
+first worker tries is the straight motion from q_start to q_goal. The trees grow in turn;
+with `balance` the smaller one until it has half of the other's nodes, since a tree in a
+narrow place needs most of the tries.
 """
 
 import jax
@@ -18,25 +20,32 @@ import jax.numpy as jnp
 from jaxplan.config import PlannerConfig
 from jaxplan.planning.proposal import Draw, mixture
 from jaxplan.planning.segment import Segment, straightened
+from jaxplan.planning.space import Space
 from jaxplan.planning.state import Control, Move, Outcome, Query, choose
-from jaxplan.planning.tree import Tree, nearest
+from jaxplan.planning.tree import Tree, at, nearest, sizes
 
 START, GOAL = 0, 1
 
 
 def roots(query: Query) -> jax.Array:
-    """`[P, 2, d]` one tree at q_start and one at q_goal."""
-    return jnp.stack([query.q_start, query.q_goal], axis=1)
+    """`[P, 1 + G, d]` one tree at q_start, and one at q_goal and the other goals."""
+    ends = jnp.stack([query.q_start, query.q_goal], axis=1)
+    return jnp.concatenate([ends, query.goals], axis=1)
 
 
-def begin(query: Query, config: PlannerConfig) -> Control:
-    """One worker connects the start's tree to the goal's root; the others grow, in turn."""
+def begin(query: Query, space: Space, config: PlannerConfig) -> Control:
+    """A worker for each goal connects the start's tree to it; the others grow, in turn."""
+    del space
     shape = len(query.q_start), config.workers
     zero, worker = jnp.zeros(shape, jnp.int32), jnp.arange(config.workers)
     no = jnp.zeros(shape, bool)
     side = jnp.broadcast_to((worker % 2).astype(jnp.int32), shape)
-    q_aim = jnp.broadcast_to(query.q_goal[:, None], (*shape, query.q_goal.shape[-1]))
-    return Control(side, no | (worker == 0), no, no, zero, zero + GOAL, q_aim, no)
+    ends = roots(query)
+    straight = worker < ends.shape[1] - 1
+    aim = jnp.broadcast_to(jnp.where(straight, worker + GOAL, GOAL), shape)
+    q_aim = ends[:, aim[0]]
+    side = jnp.where(straight, START, side)
+    return Control(side, no | straight, no, no, zero, aim, q_aim, no)
 
 
 def asks(control: Control, draw: Draw, config: PlannerConfig) -> jax.Array:
@@ -63,10 +72,15 @@ def propose(
 
 
 def advance(
-    control: Control, outcome: Outcome, query: Query, config: PlannerConfig
+    control: Control,
+    outcome: Outcome,
+    query: Query,
+    tree: Tree,
+    space: Space,
+    config: PlannerConfig,
 ) -> Control:
     """What follows an accepted or a rejected move."""
-    del query, config
+    del query, space
     ok, was = outcome.accepted, control.connecting & ~control.following
     met = was & ok & outcome.reached
     following = ok & outcome.follows & ~outcome.reached
@@ -75,8 +89,18 @@ def advance(
     q_newest = jnp.where(ok[..., None], outcome.q_new, outcome.q_base)
     q_aim = jnp.where(following[..., None], outcome.target, control.q_aim)
     onward = was & ok & ~met
+    # Whoever grew or was blocked goes over to the other tree: to connect, or to grow it.
+    side = 1 - control.side
+    if config.balance:
+        # A tree that has less than half of the other's nodes goes on growing.
+        own = jnp.where(was, side, control.side)
+        count, other = (at(sizes(tree), s) for s in (own, 1 - own))
+        grows = jnp.where(other < 2 * count, 1 - own, own)
+        side = jnp.where(grown, side, grows)
+    else:
+        side = jnp.where(was, control.side, side)
     return Control(
-        side=jnp.where(was | following, control.side, 1 - control.side),
+        side=jnp.where(onward | following, control.side, side),
         connecting=following | grown | onward,
         following=following,
         chained=following | onward,
@@ -88,11 +112,11 @@ def advance(
 
 
 def ends(
-    tree: Tree, control: Control, query: Query, config: PlannerConfig
+    tree: Tree, control: Control, query: Query, space: Space
 ) -> tuple[jax.Array, jax.Array]:
     """`[P]` the node where the trees meet, in either tree; unsolved: the best one, and none."""
     side = jnp.zeros_like(control.side[:, :1])
-    best = nearest(tree, side, query.q_goal[:, None], config.metric)[0][:, 0]
+    best = nearest(tree, side, query.q_goal[:, None], space)[0][:, 0]
     first = jnp.argmax(control.solved, axis=1)[:, None]
     newest, aim, side = (
         jnp.take_along_axis(leaf, first, axis=1)[:, 0]

@@ -17,13 +17,15 @@ other problems of a batch nor on its place among them.
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 
 from jaxplan.config import PlannerConfig
-from jaxplan.planning import bounded, rrt, rrt_connect
-from jaxplan.planning.edges import ConfigFree, motions_free, points_for
+from jaxplan.planning import bounded, domain, rrt, rrt_connect
+from jaxplan.planning.edges import ConfigFree, motions_free
 from jaxplan.planning.proposal import draw_numbers
 from jaxplan.planning.result import PlanResult, Status
-from jaxplan.planning.segment import Limits, Segment, extend
+from jaxplan.planning.segment import Segment, extend
+from jaxplan.planning.space import Space
 from jaxplan.planning.state import Move, Outcome, Query, State, choose
 from jaxplan.planning.tree import (
     at,
@@ -35,47 +37,53 @@ from jaxplan.planning.tree import (
     insert,
     nearest,
     plant,
+    sizes,
 )
 
 METHODS = {"rrt": rrt, "rrt_connect": rrt_connect, "ao_rrt_connect": rrt_connect}
+FINEST = 8
+"""Halvings of the resolution at most."""
 LIMIT_SLACK = 1e-4
 """How far a start or goal may lie outside the limits [rad]: rounding, no more."""
 MAX_WAYPOINTS = 512
 """A longer path does not count as found."""
 
 
-def examine(query: Query, limits: Limits) -> tuple[Query, jax.Array]:
+def examine(query: Query, space: Space) -> tuple[Query, jax.Array]:
     """Checks all of the questions but for collisions.
 
     Args:
         query: P problems.
-        limits: `(q_min [d], q_max [d])` [rad].
+        space: Of the configurations.
 
     Returns:
         The query, finite everywhere, and `[P]` statuses: BUDGET_EXHAUSTED where there is
         something to search.
     """
-    given = jnp.stack(query[:3])
+    given = jnp.stack([*query[:3], *jnp.moveaxis(query.goals, 1, 0)])
     finite = jnp.all(jnp.isfinite(given), axis=(0, 2))
-    middle = 0.5 * (limits[0] + limits[1])
-    q_start, q_goal, q_toggle = jnp.where(finite[:, None], given, middle)
-    query = Query(q_start, q_goal, q_toggle, query.key, query.bound)
-    ends = jnp.stack([query.q_start, query.q_goal])
-    over = (ends < limits[0] - LIMIT_SLACK) | (ends > limits[1] + LIMIT_SLACK)
+    middle = np.nan_to_num(0.5 * (space.q_min + space.q_max), posinf=0, neginf=0)
+    given = jnp.where(finite[:, None], given, middle)
+    q_start, q_goal, q_toggle = given[:3]
+    goals = jnp.moveaxis(given[3:], 0, 1)
+    query = Query(q_start, q_goal, q_toggle, query.key, query.bound, goals)
+    ends = jnp.stack([q_start, q_goal, *given[3:]])
+    over = (ends < space.q_min - LIMIT_SLACK) | (ends > space.q_max + LIMIT_SLACK)
     over = jnp.any(over, axis=(0, 2))
     status = jnp.where(over, Status.OUT_OF_LIMITS, Status.BUDGET_EXHAUSTED)
     status = jnp.where(finite, status, Status.INVALID_INPUT)
     return query, status.astype(jnp.int32)
 
 
-def empty(problems: int, joints: int, keys: jax.Array, config: PlannerConfig) -> State:
-    """A state of P problems that searches nothing; `keys [P]` of any kind."""
-    q, zero = jnp.zeros((problems, joints)), jnp.zeros(problems, jnp.int32)
-    query = Query(q, q, q, keys, jnp.zeros(problems))
+def empty(query: Query, space: Space, config: PlannerConfig) -> State:
+    """A state that searches nothing, for questions like those of `query [P]`."""
+    problems, joints = query.q_start.shape
+    zero = jnp.zeros(problems, jnp.int32)
+    roots = METHODS[config.method].roots(query).shape[1]
     return State(
         query=query,
-        tree=bare(problems, joints, config.max_expansions + 2),
-        control=METHODS[config.method].begin(query, config),
+        tree=bare(problems, joints, config.max_expansions + roots),
+        control=METHODS[config.method].begin(query, space, config),
         status=jnp.full_like(zero, Status.INACTIVE),
         waiting=jnp.zeros_like(zero, bool),
         chunk=zero,
@@ -83,6 +91,7 @@ def empty(problems: int, joints: int, keys: jax.Array, config: PlannerConfig) ->
         expansions=zero,
         accepted=zero,
         checks=zero,
+        attempt=zero,
     )
 
 
@@ -91,6 +100,7 @@ def start(
     where: jax.Array,
     query: Query,
     status: jax.Array,
+    space: Space,
     config: PlannerConfig,
 ) -> State:
     """Begins with other problems; the counters stay as they are.
@@ -100,10 +110,11 @@ def start(
         where: `[P]` which rows begin anew.
         query: `[P]` their questions.
         status: `[P]` BUDGET_EXHAUSTED where there is something to search.
+        space: Of the configurations.
         config: Planner settings.
     """
     method = METHODS[config.method]
-    control = method.begin(query, config)
+    control = method.begin(query, space, config)
     found = (status == Status.BUDGET_EXHAUSTED) & jnp.any(control.solved, axis=1)
     status = jnp.where(found, Status.SOLVED, status).astype(jnp.int32)
     return state._replace(
@@ -120,7 +131,7 @@ def advance(
     able: jax.Array,
     bank: Segment | None,
     config_free: ConfigFree,
-    limits: Limits,
+    space: Space,
     config: PlannerConfig,
 ) -> State:
     """One round.
@@ -131,7 +142,7 @@ def advance(
         bank: `[P, M]` segments, M >= K, of each problem those from `state.chunk * M` on.
             None: uniform proposals only. Bases count with `tree_context` only.
         config_free: The check of configurations.
-        limits: `(q_min [d], q_max [d])` [rad].
+        space: Of the configurations.
         config: Planner settings.
 
     Returns:
@@ -140,10 +151,11 @@ def advance(
     method, control, query = METHODS[config.method], state.control, state.query
     worker = jnp.arange(config.workers, dtype=jnp.int32)
     number = state.expansions[:, None] + worker
-    draw = draw_numbers(query.key, number, limits, config)
+    box = space.box(query.q_start[:, None], query.q_goal[:, None])
+    draw = draw_numbers(query.key, number, box, config)
     most = None
     if optimises(config):
-        draw, most = bounded.informed(draw, query, control.side, limits)
+        draw, most = bounded.informed(draw, query, control.side, space)
         most = jnp.where(control.connecting, jnp.inf, most)
     running = able[:, None] & (number < config.max_expansions)
     if bank is None:
@@ -165,23 +177,41 @@ def advance(
         move.learned, segment.base is not None, config.greedy & move.proposal.toward
     )
     follows = jnp.where(control.connecting, control.following, follows)
-    base, known = _base(state, move, most, config)
+    base, away = _base(state, move, most, space, config)
+    known = jnp.isfinite(away)
     base = jnp.where(control.chained, control.newest, base)
     q_base = configurations(state.tree, base)
-    q_new, reached = extend(q_base, move.proposal, limits)
+    proposal, grows = move.proposal, ~control.connecting & ~move.learned
+    if config.dynamic_domain > 0:
+        within = domain.radius(state.tree, base)
+        outside = grows & proposal.toward & (away > within)
+        proposal = domain.nearer(proposal, draw, q_base, outside, within, space)
+    q_new, reached = extend(q_base, proposal, space)
     length = jnp.linalg.norm(q_new - q_base, axis=-1)
     cost = at(state.tree.cost, base) + length
     moves = reached | (length > 1e-6)
     if optimises(config):
         moves &= known | control.chained
-        moves &= bounded.admits(cost, q_new, reached, control, state.tree, query)
+        moves &= bounded.admits(cost, q_new, reached, control, state.tree, query, space)
 
-    free, checks = _check(config_free, q_base, q_new, running & moves, config)
+    asked = running & moves
+    free, checks = _check(
+        config_free, q_base, q_new, asked, length * _finer(state), config
+    )
     slot = state.tree.size[:, None] + jnp.cumsum(free, axis=1, dtype=jnp.int32) - 1
     tree = insert(state.tree, q_new, base, control.side, cost, slot, free)
-    target = move.proposal.target
-    outcome = Outcome(free, slot, q_base, q_new, reached, target, follows)
-    after = choose(running, method.advance(control, outcome, query, config), control)
+    if config.dynamic_domain > 0:
+        tree = domain.adapted(
+            tree,
+            base,
+            grows & asked & ~free,
+            grows & free,
+            config.dynamic_domain,
+            config.step_max,
+        )
+    outcome = Outcome(free, slot, q_base, q_new, reached, proposal.target, follows)
+    after = method.advance(control, outcome, query, tree, space, config)
+    after = choose(running, after, control)
     solved = able & jnp.any(after.solved, axis=1)
     used = state.used + jnp.sum(asking, axis=1, dtype=jnp.int32)
     chunk = state.chunk + waiting
@@ -198,6 +228,7 @@ def advance(
         expansions=state.expansions + jnp.sum(running, axis=1, dtype=jnp.int32),
         accepted=state.accepted + jnp.sum(free, axis=1, dtype=jnp.int32),
         checks=state.checks + checks,
+        attempt=state.attempt,
     )
 
 
@@ -207,19 +238,28 @@ def optimises(config: PlannerConfig) -> bool:
 
 
 def _base(
-    state: State, move: Move, most: jax.Array | None, config: PlannerConfig
+    state: State,
+    move: Move,
+    most: jax.Array | None,
+    space: Space,
+    config: PlannerConfig,
 ) -> tuple[jax.Array, jax.Array]:
-    """SelectBase, and the tie-break toward q_toggle (section 4.3); whether there is a base."""
+    """SelectBase, and the tie-break toward q_toggle (section 4.3); its distance to the target."""
     tree, side, target = state.tree, state.control.side, move.proposal.target
     if config.toggle_tie_break <= 0:
-        return nearest(tree, side, target, config.metric, most)
-    gaps = distances(tree, side, target, config.metric)
+        return nearest(tree, side, target, space, most)
+    gaps = distances(tree, side, target, space)
     anchor, least = first_min(gaps)
     q_toggle = jnp.broadcast_to(state.query.q_toggle[:, None], target.shape)
-    to_toggle = distances(tree, side, q_toggle, config.metric)
+    to_toggle = distances(tree, side, q_toggle, space)
     ties = gaps <= least[..., None] + config.toggle_tie_break
     tied, _ = first_min(jnp.where(ties, to_toggle, jnp.inf))
-    return jnp.where(move.learned, tied, anchor), jnp.ones_like(move.learned)
+    return jnp.where(move.learned, tied, anchor), least
+
+
+def _finer(state: State) -> jax.Array:
+    """`[P, 1]` factor on the number of checked configurations: what was refused was too coarse."""
+    return jnp.exp2(jnp.minimum(state.attempt, FINEST).astype(jnp.float32))[:, None]
 
 
 def _check(
@@ -227,19 +267,20 @@ def _check(
     q0: jax.Array,
     q1: jax.Array,
     asked: jax.Array,
+    length: jax.Array,
     config: PlannerConfig,
 ) -> tuple[jax.Array, jax.Array]:
     """`[P, K]` which motions are free, and `[P]` how many configurations that took."""
     problems, workers, d = q0.shape
     problem = jnp.repeat(jnp.arange(problems, dtype=jnp.int32), workers)
-    points = points_for(config.step_max, config.edge_resolution)
+    points = jnp.ceil(length / config.edge_resolution - 1e-3)
+    points = jnp.where(asked, jnp.maximum(points, 1), 0).astype(jnp.int32)
     free, checks = motions_free(
         config_free,
         problem,
         q0.reshape(-1, d),
         q1.reshape(-1, d),
-        asked.reshape(-1),
-        points,
+        points.reshape(-1),
         rows_for(problems, config),
     )
     shape = problems, workers
@@ -256,13 +297,14 @@ def waypoints(config: PlannerConfig) -> int:
     return min(config.max_expansions + 2, MAX_WAYPOINTS)
 
 
-def finish(state: State, config: PlannerConfig) -> PlanResult:
+def finish(state: State, space: Space, config: PlannerConfig) -> PlanResult:
     """Reads the paths out of the trees."""
     method = METHODS[config.method]
-    node, joint = method.ends(state.tree, state.control, state.query, config)
+    node, joint = method.ends(state.tree, state.control, state.query, space)
     searched = state.status <= Status.BUDGET_EXHAUSTED
     node, joint = jnp.where(searched, node, -1), jnp.where(searched, joint, -1)
     path, path_length = extract_path(state.tree, node, joint, waypoints(config))
+    path = space.unwound(path)
     cut = path_length > path.shape[1]
     return PlanResult(
         path=path,
@@ -272,4 +314,5 @@ def finish(state: State, config: PlannerConfig) -> PlanResult:
         accepted=state.accepted,
         learned=state.used,
         checks=state.checks,
+        nodes=sizes(state.tree),
     )

@@ -15,13 +15,13 @@ from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
+import numpy as np
+
+from jaxplan.planning.space import Space
 
 SNAP = 1.0001
 """A target this share of a step away is reached: without it, a straight motion of a whole
 number of steps would end on the rounding of its last step."""
-
-Limits = tuple[jax.Array, jax.Array]
-"""`(q_min [d], q_max [d])` [rad]."""
 
 
 class Segment(NamedTuple):
@@ -82,22 +82,26 @@ def usable(segment: Segment) -> jax.Array:
 
 
 def extend(
-    q_base: jax.Array, proposal: Proposal, limits: Limits
+    q_base: jax.Array, proposal: Proposal, space: Space
 ) -> tuple[jax.Array, jax.Array]:
     """Carries out a proposal from its base (equation 4, with the projection to limits).
 
     Args:
         q_base: `[P, K, d]` [rad].
         proposal: Moves, one for each row of `q_base`.
-        limits: Of the joints [rad].
+        space: Limits, and which joints come round.
 
     Returns:
-        `q_new [P, K, d]`, and `reached [P, K]`: whether it is the target, to the last bit.
+        `q_new [P, K, d]`, and `reached [P, K]`: whether it is the target, to the last bit; or
+        in joints that come round, some turns from it.
     """
-    gap = proposal.target - q_base
+    gap = space.gap(q_base, proposal.target)
     distance = jnp.linalg.norm(gap, axis=-1)
     reached = proposal.toward & (distance <= SNAP * proposal.length)
     straight = gap / jnp.maximum(distance, 1e-9)[..., None]
     direction = jnp.where(proposal.toward[..., None], straight, proposal.direction)
-    q_new = jnp.clip(q_base + proposal.length[..., None] * direction, *limits)
-    return jnp.where(reached[..., None], proposal.target, q_new), reached
+    q_new = space.project(q_base + proposal.length[..., None] * direction)
+    target = proposal.target
+    if space.turns:
+        target = jnp.where(np.array(space.circular), q_base + gap, target)
+    return jnp.where(reached[..., None], target, q_new), reached

@@ -26,6 +26,9 @@ class Query(NamedTuple):
     """`[P]` typed keys."""
     bound: jax.Array
     """`[P]` a path has to be shorter than this [rad]; only `ao_rrt_connect` looks at it."""
+    goals: jax.Array
+    """`[P, G - 1, d]` goals beside q_goal that are as good; only `rrt_connect` looks at
+    them [rad]."""
 
 
 class Control(NamedTuple):
@@ -76,7 +79,7 @@ class Outcome(NamedTuple):
 
 
 class State(NamedTuple):
-    """A search between two calls of `grow`."""
+    """A search between two rounds."""
 
     query: Query
     tree: Tree
@@ -92,6 +95,8 @@ class State(NamedTuple):
     expansions: jax.Array
     accepted: jax.Array
     checks: jax.Array
+    attempt: jax.Array
+    """`[P]` paths that were refused so far; motions are checked twice as finely after each."""
 
 
 def searching(state: State, config: PlannerConfig) -> jax.Array:

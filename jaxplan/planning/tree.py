@@ -1,7 +1,8 @@
 """Search trees in fixed arrays: allocated once, filled in order, never grown.
 
 The trees of one problem share one pool of nodes; `side` says which tree a node is in.
-An RRT has one tree (side 0, root 0), RRT-Connect a second one from the goal (side 1, root 1).
+An RRT has one tree (side 0, root 0), RRT-Connect a second one from the goal (side 1, root 1),
+or from a set of goals (roots 1 to G).
 """
 
 from typing import NamedTuple
@@ -9,12 +10,11 @@ from typing import NamedTuple
 import jax
 import jax.numpy as jnp
 
+from jaxplan.planning.space import Space
+
 NO_PARENT = -1
 BLOCK = 256
 """Nodes that a search for the nearest looks at in one go; the pool is a multiple of it."""
-
-Metric = tuple[float, ...] | None
-"""Diagonal of W in d(q, q') = |W (q - q')|; None = identity."""
 
 
 class Tree(NamedTuple):
@@ -28,8 +28,12 @@ class Tree(NamedTuple):
     """`[P, N]` 0 = tree of the start, 1 = tree of the goal."""
     cost: jax.Array
     """`[P, N]` length of the path to the node from the root of its tree [rad]."""
+    domain: jax.Array
+    """`[P, N]` samples farther away than this do not come to the node (`domain`) [rad]."""
     size: jax.Array
     """`[P]` nodes in use, both trees together; what lies behind them means nothing."""
+    behind: jax.Array
+    """`[P]` how many of them are in the goal's tree."""
 
 
 def bare(problems: int, joints: int, capacity: int) -> Tree:
@@ -38,11 +42,15 @@ def bare(problems: int, joints: int, capacity: int) -> Tree:
     nodes = jnp.zeros((problems, capacity), jnp.int32)
     q = jnp.zeros((problems, joints, capacity))
     cost = jnp.zeros((problems, capacity))
-    return Tree(q, nodes, nodes, cost, jnp.zeros(problems, jnp.int32))
+    none = jnp.zeros(problems, jnp.int32)
+    return Tree(q, nodes, nodes, cost, jnp.full_like(cost, jnp.inf), none, none)
 
 
 def plant(tree: Tree, roots: jax.Array, where: jax.Array) -> Tree:
-    """Trees that hold the roots `[P, sides, d]` and nothing else, in the problems `where [P]`."""
+    """Trees that hold the roots `[P, R, d]` and nothing else, in the problems `where [P]`.
+
+    The first is the start's, the others are the goal's.
+    """
     sides = roots.shape[1]
 
     def set_(leaf: jax.Array, value: jax.Array) -> jax.Array:
@@ -53,23 +61,19 @@ def plant(tree: Tree, roots: jax.Array, where: jax.Array) -> Tree:
     return Tree(
         q=set_(tree.q, jnp.swapaxes(roots, 1, 2)),
         parent=set_(tree.parent, jnp.full((1, sides), NO_PARENT)),
-        side=set_(tree.side, jnp.arange(sides)[None]),
+        side=set_(tree.side, jnp.minimum(jnp.arange(sides), 1)[None]),
         cost=set_(tree.cost, jnp.zeros((1, sides))),
+        domain=jnp.where(where[:, None], jnp.inf, tree.domain),
         size=jnp.where(where, sides, tree.size),
+        behind=jnp.where(where, sides - 1, tree.behind),
     )
-
-
-def distance(q0: jax.Array, q1: jax.Array, metric: Metric) -> jax.Array:
-    """d(q, q') over the last axis."""
-    gap = q0 - q1
-    return jnp.sqrt(_squares([gap[..., j] for j in range(gap.shape[-1])], metric))
 
 
 def nearest(
     tree: Tree,
     side: jax.Array,
     target: jax.Array,
-    metric: Metric,
+    space: Space,
     most: jax.Array | None = None,
 ) -> tuple[jax.Array, jax.Array]:
     """The node of a tree that is nearest to a target, the oldest of equals.
@@ -78,11 +82,11 @@ def nearest(
         tree: Search trees.
         side: `[P, K]` in which tree to look.
         target: `[P, K, d]` [rad].
-        metric: Diagonal of W.
+        space: Of the configurations.
         most: `[P, K]` only nodes from which the target costs at most this are looked at.
 
     Returns:
-        `[P, K]` the node, and `[P, K]` whether there is any.
+        `[P, K]` the node, and `[P, K]` how far it is, infinite if there is none.
     """
     joints = range(target.shape[-1])
 
@@ -92,10 +96,10 @@ def nearest(
             jax.lax.dynamic_slice_in_dim(leaf, i * BLOCK, BLOCK, leaf.ndim - 1)
             for leaf in (tree.q, tree.side)
         )
-        gaps = [target[..., j, None] - q[:, None, j] for j in joints]
+        gaps = [space.short(target[..., j, None] - q[:, None, j], j) for j in joints]
         used = i * BLOCK + jnp.arange(BLOCK) < tree.size[:, None, None]
         here = (sides[:, None] == side[..., None]) & used
-        squares = _squares(gaps, metric)
+        squares = space.squares(gaps)
         if most is not None:
             cost = jax.lax.dynamic_slice_in_dim(tree.cost, i * BLOCK, BLOCK, 1)
             here &= cost[:, None] + jnp.sqrt(squares) <= most[..., None]
@@ -110,15 +114,18 @@ def nearest(
     none = jnp.full(side.shape, jnp.inf), jnp.zeros(side.shape, jnp.int32)
     blocks = (jnp.max(tree.size) + BLOCK - 1) // BLOCK
     least, index = jax.lax.fori_loop(0, blocks, block, none)
-    return index, jnp.isfinite(least)
+    return index, jnp.sqrt(least)
 
 
 def distances(
-    tree: Tree, side: jax.Array, target: jax.Array, metric: Metric
+    tree: Tree, side: jax.Array, target: jax.Array, space: Space
 ) -> jax.Array:
     """`[P, K, N]` distance of every node to `target [P, K, d]`, infinite off tree `side [P, K]`."""
-    gaps = [target[..., j, None] - tree.q[:, None, j] for j in range(target.shape[-1])]
-    gaps = jnp.sqrt(_squares(gaps, metric))
+    gaps = [
+        space.short(target[..., j, None] - tree.q[:, None, j], j)
+        for j in range(target.shape[-1])
+    ]
+    gaps = jnp.sqrt(space.squares(gaps))
     used = jnp.arange(tree.side.shape[1]) < tree.size[:, None, None]
     here = (tree.side[:, None] == side[..., None]) & used
     return jnp.where(here, gaps, jnp.inf)
@@ -162,13 +169,19 @@ def insert(
     """Writes those of `[P, K]` candidate nodes that `keep` marks into their slots."""
     index = jnp.where(keep, slot, tree.parent.shape[1])
     problem = jnp.arange(keep.shape[0])[:, None]
-    return Tree(
+    return tree._replace(
         q=tree.q.at[problem, :, index].set(q, mode="drop"),
         parent=tree.parent.at[problem, index].set(parent, mode="drop"),
         side=tree.side.at[problem, index].set(side, mode="drop"),
         cost=tree.cost.at[problem, index].set(cost, mode="drop"),
         size=tree.size + jnp.sum(keep, axis=1, dtype=jnp.int32),
+        behind=tree.behind + jnp.sum(keep & (side == 1), axis=1, dtype=jnp.int32),
     )
+
+
+def sizes(tree: Tree) -> jax.Array:
+    """`[P, 2]` nodes of the start's tree and of the goal's."""
+    return jnp.stack([tree.size - tree.behind, tree.behind], axis=1)
 
 
 def extract_path(
@@ -214,12 +227,3 @@ def _lineage(tree: Tree, node: jax.Array) -> tuple[jax.Array, jax.Array]:
     carry = (jnp.int32(0), node, line, length)
     _, _, line, length = jax.lax.while_loop(lambda c: jnp.any(c[1] >= 0), climb, carry)
     return line, length
-
-
-def _squares(gaps: list[jax.Array], metric: Metric) -> jax.Array:
-    """Sum of squares, joint by joint: XLA CPU does not vectorise over so short an axis."""
-    weights = (1.0,) * len(gaps) if metric is None else metric
-    return sum(
-        (gap if w == 1.0 else w * gap) ** 2
-        for w, gap in zip(weights, gaps, strict=True)
-    )  # type: ignore[return-value]

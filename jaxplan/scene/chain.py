@@ -54,7 +54,8 @@ def arm_joints(model: mujoco.MjModel, names: tuple[str, ...]) -> tuple[str, ...]
 
     Where the tree branches, what follows is a hand if no branch has more joints than
     stand above it; else the arm goes on in the longest branch. Joints at the very end
-    that are a gripper's by name do not belong to it.
+    that are a gripper's by name do not belong to it, nor do those at its start by which
+    a base drives over the floor.
 
     Args:
         model: The model.
@@ -65,7 +66,8 @@ def arm_joints(model: mujoco.MjModel, names: tuple[str, ...]) -> tuple[str, ...]
     """
     chains = _longest(model, 0, ())
     if len(chains) > 1:
-        listed = "; ".join(", ".join(names[j] for j in chain) for chain in chains)
+        arms = [_after_base(model, chain) for chain in chains]
+        listed = "; ".join(", ".join(names[j] for j in arm) for arm in arms)
         raise ValueError(
             f"which joints are the arm's? Say joints=[...], for there are {listed}"
         )
@@ -73,7 +75,7 @@ def arm_joints(model: mujoco.MjModel, names: tuple[str, ...]) -> tuple[str, ...]
     if arm and not _heads(model, model.jnt_bodyid[arm[-1]]):
         while arm and any(word in names[arm[-1]].lower() for word in GRIPPER):
             arm.pop()
-    return tuple(names[j] for j in arm)
+    return tuple(names[j] for j in _after_base(model, arm))
 
 
 def last_body(model: mujoco.MjModel, body: int, following: Collection[int]) -> int:
@@ -120,9 +122,36 @@ def _longest(
         for chain in _longest(model, head, (*above, *simple_joints(model, head)))
     ]
     length = max(map(len, chains), default=0)
-    if not heads or (len(heads) > 1 and length <= 2 * len(above)):
+    driving = _driving(model, above)
+    # Fingers on a base that drives are no arm.
+    fingers = max(2 * (len(above) - driving), min(driving, 1))
+    if not heads or (len(heads) > 1 and length - driving <= fingers):
         return [above]
     return [chain for chain in chains if len(chain) == length]
+
+
+def _after_base(model: mujoco.MjModel, chain: Sequence[int]) -> Sequence[int]:
+    """The chain without the joints that drive a base, unless there are no others."""
+    return chain[_driving(model, chain) :] or chain
+
+
+def _driving(model: mujoco.MjModel, chain: Sequence[int]) -> int:
+    """How many joints at the start of a chain drive a base over the floor.
+
+    These are slides without limits, two or more, or exactly two slides, and then a hinge
+    across them, unless geoms stand before it: it is a shoulder then.
+    """
+    slides = 0
+    while slides < len(chain) and model.jnt_type[chain[slides]] == SIMPLE_JOINTS[1]:
+        slides += 1
+    limited = model.jnt_limited[list(chain[:slides])] != 0
+    endless = int(limited.argmax()) if limited.any() else slides
+    turns = slides == 2 < len(chain)
+    if turns:
+        axes, bodies = (of[list(chain)] for of in (model.jnt_axis, model.jnt_bodyid))
+        across = np.abs(axes[:2] @ axes[2]).max() < 1e-3
+        turns = across and (bodies[1] == bodies[2] or not model.body_geomnum[bodies[1]])
+    return 3 if turns else endless if endless >= 2 else 0
 
 
 def _heads(model: mujoco.MjModel, body: int) -> list[int]:

@@ -11,6 +11,7 @@ kind on another, because a rectangle is one array expression in the collision en
 Boxes in one rectangle are parallel as well: the engine turns the points once for all.
 """
 
+from collections.abc import Collection, Iterable
 from itertools import combinations, product
 from typing import NamedTuple
 
@@ -50,8 +51,15 @@ class Contact(NamedTuple):
     b: Geoms
 
 
-def find_contacts(model: mujoco.MjModel) -> tuple[Contact, ...]:
-    """Every pair of geoms that MuJoCo would check, as rectangles."""
+def find_contacts(
+    model: mujoco.MjModel, excluded: Collection[tuple[int, int]] = ()
+) -> tuple[Contact, ...]:
+    """Every pair of geoms that MuJoCo would check, as rectangles.
+
+    Args:
+        model: The model.
+        excluded: Pairs `(i, j)` of geoms, i < j, that are left out.
+    """
     geoms = _alike(model)
     contacts = []
     for body_1, body_2 in combinations(range(model.nbody), 2):
@@ -68,12 +76,41 @@ def find_contacts(model: mujoco.MjModel) -> tuple[Contact, ...]:
         )
         if (int(i), int(j)) not in known and (int(j), int(i)) not in known:
             contacts.append(_ordered(a, b))
-    return tuple(contacts)
+    return tuple(part for contact in contacts for part in _without(contact, excluded))
 
 
 def geom_pairs(contact: Contact) -> list[tuple[int, int]]:
     """The pairs of geom ids that a rectangle stands for."""
     return list(product(contact.a.ids, contact.b.ids))
+
+
+def refuse_unsupported(model: mujoco.MjModel, contacts: Iterable[Contact]) -> None:
+    """Names a geom that planning cannot check, rather than to look past it.
+
+    Raises:
+        ValueError: A contact is of such a geom.
+    """
+    for side in (side for contact in contacts for side in contact):
+        if side.kind in ("hfield", "sdf"):
+            name = model.geom(side.ids[0]).name or f"geom {side.ids[0]}"
+            long = {"hfield": "a height field", "sdf": "a signed distance field"}
+            raise ValueError(
+                f"{name!r} is {long[side.kind]}, which is not supported: use a mesh or "
+                "boxes, or set its contype and conaffinity to 0"
+            )
+
+
+def _without(contact: Contact, excluded: Collection[tuple[int, int]]) -> list[Contact]:
+    """The rectangles that are left of one."""
+    rows: dict[tuple[int, ...], list[int]] = {}
+    for i in contact.a.ids:
+        kept = [j for j in contact.b.ids if (min(i, j), max(i, j)) not in excluded]
+        rows.setdefault(tuple(kept), []).append(i)
+    return [
+        Contact(contact.a._replace(ids=tuple(ids)), contact.b._replace(ids=kept))
+        for kept, ids in rows.items()
+        if kept
+    ]
 
 
 def _alike(model: mujoco.MjModel) -> list[list[Geoms]]:

@@ -23,6 +23,19 @@ def names_of(model: mujoco.MjModel, kind: Literal["body", "joint"]) -> tuple[str
     return tuple(names)
 
 
+def geom_name(model: mujoco.MjModel, bodies: Sequence[str], geom: int) -> str:
+    """A geom's name; body[number] where it has none.
+
+    Args:
+        model: The model.
+        bodies: Names by id.
+        geom: Its id.
+    """
+    body = model.geom_bodyid[geom]
+    number = geom - model.body_geomadr[body]
+    return model.geom(geom).name or f"{bodies[body]}[{number}]"
+
+
 def known(name: str, kind: str, names: Sequence[str]) -> str:
     """The name itself if it is among `names`, else a ValueError that suggests one."""
     if name in names:
@@ -59,7 +72,8 @@ def pair_of(
             f"{name!r} may be {' or '.join(map(str, meant))}: give a tuple"
         )
     if not meant:
-        known("|".join(sorted(parts)), "contact group", pairs)
+        if pairs:
+            known("|".join(sorted(parts)), "contact group", pairs)
         raise ValueError(f"{name!r} is no pair of bodies")
     return meant[0]
 

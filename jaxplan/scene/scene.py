@@ -13,18 +13,23 @@ import dataclasses
 from collections.abc import Iterable, Mapping, Sequence
 from functools import partial
 from os import PathLike
+from typing import Any
 
 import jax
 import mujoco
 import numpy as np
 
+from jaxplan.process import refuse_fork
 from jaxplan.scene.chain import line
 from jaxplan.scene.contacts import geom_pairs
+from jaxplan.scene.excludes import ALWAYS, Exclude, Excluded
 from jaxplan.scene.limits import arm_limits, circular, rates
-from jaxplan.scene.names import known, pair_of, shortened
+from jaxplan.scene.names import geom_name, known, pair_of, shortened
 from jaxplan.scene.numbers import Numbers, read_numbers
-from jaxplan.scene.source import SLOTS, compile_model
+from jaxplan.scene.source import SLOTS, check_arguments, compile_model
+from jaxplan.scene.srdf import read_srdf
 from jaxplan.scene.structure import Group, Slot, Structure, read_structure
+from jaxplan.scene.urdf import read_urdf
 
 
 @partial(
@@ -39,6 +44,11 @@ class Scene:
     model: Numbers
     structure: Structure
 
+    def __getstate__(self) -> dict[str, Any]:
+        """A copy has its numbers in NumPy: so it can be read without JAX."""
+        numbers = Numbers(*map(np.asarray, self.model))  # type: ignore[arg-type]
+        return {"model": numbers, "structure": self.structure}
+
     @classmethod
     def from_mjcf(
         cls,
@@ -46,22 +56,28 @@ class Scene:
         joints: Sequence[str] | None = None,
         hand: str | None = None,
         slots: Mapping[str, int] | None = None,
+        exclude: Exclude = ALWAYS,
     ) -> "Scene":
         """Reads a scene.
 
         Args:
-            source: An MJCF's path or text, an `MjSpec` or an `MjModel`.
+            source: An MJCF's path or text, a URDF's path, an `MjSpec` or an `MjModel`.
             joints: The arm's joints in the order of q. None: all hinge and slide joints
                 that are not the gripper's, on the longest way down from the world. It
                 ends where the tree branches into parts with no more joints than stand
                 above (fingers), and before joints at the very end that are called
-                gripper, finger or jaw. Joints that follow others by an <equality><joint>
-                are none of the arm's, unless those can follow them.
+                gripper, finger or jaw; it begins after those that drive a base over the
+                floor. Joints that follow others by an <equality><joint> are none of the
+                arm's, unless those can follow them.
             hand: The body that carries what is held. None: the last body before another
                 joint or a branch follows, from that of the last of `joints` on.
             slots: Room for obstacles that change between queries: how many of each kind
                 (sphere, capsule, cylinder, ellipsoid, box), such as `{"box": 16}`. They
                 can touch whatever can touch anything.
+            exclude: Contacts to leave out, besides the model's own: "always_touching", for
+                geoms that overlap wherever the arm is (neighbouring links, often; never
+                objects and slots); pairs of bodies, ("hand", "mug") or "hand|mug"; a list
+                of both; or None. `excluded` says which.
 
         Raises:
             FileNotFoundError: There is no such file.
@@ -71,13 +87,48 @@ class Scene:
                 field, a flex or an SDF; the arm's joints are tied by a loop or a tendon,
                 or leave no values to joints that follow them.
         """
+        refuse_fork()
+        check_arguments(source, joints, hand, slots)
         slots = slots or {}
         model = compile_model(source, slots)
         names = SLOTS if any(slots.values()) else None
-        structure = read_structure(model, joints, hand, names)
+        structure = read_structure(model, joints, hand, names, exclude)
         numbers = read_numbers(model)
         arm_limits(structure, numbers)  # raises where a joint has no room
         return cls(numbers, structure)
+
+    @classmethod
+    def from_urdf(
+        cls,
+        path: str | PathLike,
+        srdf: str | PathLike | None = None,
+        joints: str | Sequence[str] | None = None,
+        hand: str | None = None,
+        slots: Mapping[str, int] | None = None,
+        exclude: Exclude = ALWAYS,
+        meshes: str | PathLike | None = None,
+    ) -> "Scene":
+        """Reads a robot as ROS has it: its collision shapes, with its root link fixed.
+
+        Args:
+            path: Of the URDF.
+            srdf: Of the SRDF: links whose collisions it disables are left out.
+            joints: As for `from_mjcf`, or the name of a group in the SRDF.
+            hand: See `from_mjcf`.
+            slots: See `from_mjcf`.
+            exclude: See `from_mjcf`.
+            meshes: Folder of packages or meshes; None: the URDF's own, and all above it.
+
+        Raises:
+            FileNotFoundError: There is no such file, or a mesh that is not found.
+            ValueError: As for `from_mjcf`; no such group; a mesh that MuJoCo cannot read.
+        """
+        spec = read_urdf(path, meshes)
+        disabled, groups = ((), {}) if srdf is None else read_srdf(srdf, spec)
+        if isinstance(joints, str):
+            joints = groups[known(joints, "group", list(groups))]
+        given = [exclude] if isinstance(exclude, str) else exclude or ()
+        return cls.from_mjcf(spec, joints, hand, slots, [*given, *disabled])
 
     def replace(self, **fields: jax.Array) -> "Scene":
         """The scene with some of its `Numbers` replaced, e.g. `geom_pos`.
@@ -92,8 +143,8 @@ class Scene:
             model = copy.copy(self.mj_model)
             for name in changed:
                 getattr(model, name)[:] = np.asarray(fields[name])
-            slots = SLOTS if self.slots else None
-            structure = read_structure(model, self.joints, self.hand, slots)
+            names = self.joints, self.hand, SLOTS if self.slots else None
+            structure = read_structure(model, *names, structure.excludes)
         return Scene(self.model._replace(**fields), structure)
 
     @property
@@ -151,6 +202,11 @@ class Scene:
         return self.structure.groups
 
     @property
+    def excluded(self) -> tuple[Excluded, ...]:
+        """Contacts that are left out besides the model's own, and why."""
+        return self.structure.excludes.rows
+
+    @property
     def q_min(self) -> jax.Array:
         """`[d]` lower joint limits [rad or m]; -inf where a joint has none.
 
@@ -195,11 +251,6 @@ class Scene:
         """`[n]` where the joints' positions (a free joint's seven) begin in qpos."""
         ids = [self.joint_id(name) for name in joints]
         return self.mj_model.jnt_qposadr[np.array(ids, int)]
-
-    @property
-    def arm_bodies(self) -> set[int]:
-        """Ids of the bodies on which the arm's joints are, and those that follow them."""
-        return set(self.structure.moved)
 
     def line(self, body: int) -> list[int]:
         """Ids of the body, its parent and so on, without the world."""
@@ -252,10 +303,7 @@ class Scene:
 
     def geom_name(self, geom: int) -> str:
         """A geom's name; body[number] where it has none."""
-        model = self.mj_model
-        body = model.geom_bodyid[geom]
-        number = geom - model.body_geomadr[body]
-        return model.geom(geom).name or f"{self.structure.body_names[body]}[{number}]"
+        return geom_name(self.mj_model, self.structure.body_names, geom)
 
     def __repr__(self) -> str:
         return (

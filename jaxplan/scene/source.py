@@ -1,17 +1,42 @@
 """From an MJCF to a compiled model, with room for obstacles, or one line of what is wrong."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from os import PathLike
 from pathlib import Path
+from typing import Any
 
 import mujoco
 import numpy as np
 
+from jaxplan.ranges import Whole, check
 from jaxplan.scene.names import known, names_of
+from jaxplan.scene.urdf import read_urdf
 
 SLOTS = "obstacles"
 """The body whose geoms are slots."""
 SLOT_KINDS = ("sphere", "capsule", "cylinder", "ellipsoid", "box")
+
+
+def check_arguments(
+    source: Any,
+    joints: Sequence[str] | None,
+    hand: str | None,
+    slots: Mapping[str, int] | None,
+) -> None:
+    """Refuses what `Scene.from_mjcf` cannot have been given on purpose.
+
+    Raises:
+        ValueError: An argument of the wrong type, by name.
+    """
+    check("source", source, str | PathLike | mujoco.MjSpec | mujoco.MjModel)
+    if isinstance(joints, Sequence) and not isinstance(joints, str):
+        joints = tuple(joints)
+    check("joints", joints, tuple[str, ...] | None)
+    check("hand", hand, str | None)
+    check("slots", slots, Mapping | None)
+    for kind, count in (slots or {}).items():
+        check("slots: kind", kind, str)
+        check(f"slots[{kind!r}]", count, Whole)
 
 
 def compile_model(
@@ -20,7 +45,7 @@ def compile_model(
     """The compiled model, with geoms of a body `obstacles` as slots.
 
     Args:
-        source: An MJCF's path or text, an `MjSpec` or an `MjModel`.
+        source: An MJCF's path or text, a URDF's path, an `MjSpec` or an `MjModel`.
         slots: How many of each kind, such as `{"box": 16}`.
 
     Raises:
@@ -38,6 +63,9 @@ def compile_model(
             spec = source.copy()
         elif str(source).lstrip().startswith("<"):
             spec = mujoco.MjSpec.from_string(str(source))
+        elif Path(source).suffix == ".urdf":
+            spec = read_urdf(source)
+            where = f"{source}: "
         elif Path(source).is_file():
             where = f"{source}: "
             spec = mujoco.MjSpec.from_file(str(source))

@@ -2,17 +2,26 @@
 
 import dataclasses
 from collections.abc import Sequence
+from functools import cached_property
 from typing import NamedTuple
 
 import mujoco
 import numpy as np
 
 from jaxplan.scene.chain import SIMPLE_JOINTS, last_body, line, read_arm
-from jaxplan.scene.contacts import Contact, find_contacts, kind_of
+from jaxplan.scene.contacts import (
+    Contact,
+    find_contacts,
+    geom_pairs,
+    kind_of,
+    refuse_unsupported,
+)
 from jaxplan.scene.dependent import Dependent, in_order, root_of
+from jaxplan.scene.excludes import Exclude, Excludes, find_excludes
 from jaxplan.scene.flexes import refuse_flexes
 from jaxplan.scene.loops import refuse_loops
 from jaxplan.scene.names import known, names_of
+from jaxplan.scene.touching import Motion, near_distances
 
 
 class Link(NamedTuple):
@@ -75,6 +84,7 @@ class Structure:
     hand: str
     slots: tuple[Slot, ...]
     groups: tuple[Group, ...]
+    excludes: Excludes
     links: tuple[Link, ...]
     """Links that collision needs, row 1 first (row 0 is the world). Parents stand before
     children: first the fixed trees and the hand's, then the movable objects, which the
@@ -82,12 +92,24 @@ class Structure:
     link_of: dict[int, int]
     """Row of a body's frame, by body id."""
 
+    @cached_property
+    def near(self) -> dict[tuple[int, int], float]:
+        """Geoms `(i, j)`, i < j, of neighbours that are hardly ever farther apart than so [m].
+
+        A margin at least as large counts as none for them: no pose keeps it.
+        """
+        groups = (group for group in self.groups if not group.held)
+        pairs = [p for group in groups for c in group.contacts for p in geom_pairs(c)]
+        motion = Motion(self.moved, self.variables, self.dependent)
+        return near_distances(self.mj_model, motion, pairs)
+
 
 def read_structure(
     model: mujoco.MjModel,
     joints: Sequence[str] | None,
     hand: str | None,
     slots: str | None = None,
+    exclude: Exclude | Excludes = None,
 ) -> Structure:
     """Reads names, tree and contacts; `Scene.from_mjcf` says what None means.
 
@@ -96,6 +118,7 @@ def read_structure(
         joints: The arm's.
         hand: A body.
         slots: The body whose geoms are slots.
+        exclude: Contacts to leave out, or what was found to be left out.
 
     Raises:
         ValueError: A joint or body is not in the model, or cannot be planned for.
@@ -120,7 +143,11 @@ def read_structure(
     mocap = [int(b) for b in np.flatnonzero(model.body_mocapid >= 0)]
     refuse_loops(model, bodies, moving)
     refuse_flexes(model, moved | set(free))
-    groups = _groups(model, bodies, moved, free)
+    if not isinstance(exclude, Excludes):
+        apart = [*free, *mocap, *([bodies.index(slots)] if slots else ())]
+        motion = Motion(moved, variables, dependent)
+        exclude = find_excludes(model, bodies, motion, apart, exclude)
+    groups = _groups(model, bodies, moved, free, exclude)
     needed = {bodies.index(hand)}
     for group in groups:
         needed |= {side.body for contact in group.contacts for side in contact}
@@ -145,13 +172,52 @@ def read_structure(
             if bodies[body] == slots
         ),
         groups=groups,
+        excludes=exclude,
         links=links,
         link_of=link_of,
     )
 
 
+def only_line(structure: Structure, body: int) -> Structure:
+    """The structure with the links of one body's line only.
+
+    Where the hand may hold what the body hangs on, the hand's line is there too.
+    """
+    model, bodies = structure.mj_model, structure.body_names
+    hand = bodies.index(structure.hand)
+    objects = [bodies.index(name) for name in structure.objects]
+    needed = set(line(model, body))
+    if needed & set(objects):
+        needed |= set(line(model, hand))
+    links, link_of = _links(
+        model,
+        needed,
+        structure.joint_names,
+        structure.variables,
+        objects,
+        int(model.body_rootid[hand]),
+    )
+    return dataclasses.replace(structure, links=links, link_of=link_of)
+
+
+def movers(structure: Structure, body: int) -> np.ndarray:
+    """`[d]` bool: joints of the arm that move a body, by themselves or what follows them."""
+    model = structure.mj_model
+    above = np.isin(model.jnt_bodyid[list(structure.variables)], line(model, body))
+    first = len(structure.variables) - len(structure.dependent)
+    followers = list(enumerate(structure.dependent, first))
+    for own, (_, master, _) in reversed(followers):
+        if master >= 0:
+            above[master] |= above[own]
+    return above[: len(structure.joints)]
+
+
 def _groups(
-    model: mujoco.MjModel, names: tuple[str, ...], arm: frozenset[int], free: list[int]
+    model: mujoco.MjModel,
+    names: tuple[str, ...],
+    arm: frozenset[int],
+    free: list[int],
+    excludes: Excludes,
 ) -> tuple[Group, ...]:
     """Contacts by pair of bodies.
 
@@ -163,9 +229,10 @@ def _groups(
         names: Of bodies, by id.
         arm: Bodies that the arm's joints move first.
         free: Bodies with a free joint: objects that can be held.
+        excludes: What is left out.
     """
     between: dict[tuple[int, int], list[Contact]] = {}
-    for contact in find_contacts(model):
+    for contact in find_contacts(model, excludes.geoms):
         first, second = sorted(side.body for side in contact)
         between.setdefault((first, second), []).append(contact)
     groups = []
@@ -174,22 +241,10 @@ def _groups(
         apart = set(lines[0]) ^ set(lines[1])
         held = tuple(free.index(body) for body in free if body in apart)
         if arm & apart or held:
-            _refuse_unsupported(model, contacts)
+            refuse_unsupported(model, contacts)
             name = "|".join(sorted(names[body] for body in pair))
             groups.append(Group(name, tuple(contacts), () if arm & apart else held))
     return tuple(groups)
-
-
-def _refuse_unsupported(model: mujoco.MjModel, contacts: list[Contact]) -> None:
-    """Names a geom that planning cannot check, rather than to look past it."""
-    for side in (side for contact in contacts for side in contact):
-        if side.kind in ("hfield", "sdf"):
-            name = model.geom(side.ids[0]).name or f"geom {side.ids[0]}"
-            long = {"hfield": "a height field", "sdf": "a signed distance field"}
-            raise ValueError(
-                f"{name!r} is {long[side.kind]}, which is not supported: use a mesh or "
-                "boxes, or set its contype and conaffinity to 0"
-            )
 
 
 def _links(

@@ -23,17 +23,29 @@ def _use_headless_gl() -> None:
 
     MuJoCo chooses by `MUJOCO_GL` when it is imported, which is too early for a library to set.
     """
-    if (
-        os.environ.get("MUJOCO_GL")
-        or os.environ.get("DISPLAY")
-        or sys.platform != "linux"
-    ):
+    if setting := os.environ.get("MUJOCO_GL"):
+        if not hasattr(gl_context, "GLContext"):
+            raise NoGLError(
+                f"MUJOCO_GL={setting} cannot render here: unset it, or set it to egl "
+                "(apt install libegl1 libgl1-mesa-dri) or osmesa (apt install libosmesa6)"
+            )
+        return
+    if os.environ.get("DISPLAY") or sys.platform != "linux":
         return
     for name, library in (("egl", "EGL"), ("osmesa", "OSMesa")):
         if ctypes.util.find_library(library):
             gl_context.GLContext = importlib.import_module(f"mujoco.{name}").GLContext
             return
     raise NoGLError(ADVICE)
+
+
+def require_gl() -> None:
+    """Asks for rendering before the work whose result is to be rendered.
+
+    Raises:
+        NoGLError: No GL library, or `MUJOCO_GL` asks for one that is not there.
+    """
+    Camera(mujoco.MjModel.from_xml_string("<mujoco/>"), 8, 8)
 
 
 class Camera:

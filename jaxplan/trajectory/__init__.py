@@ -4,17 +4,17 @@ from jaxplan.trajectory.shortcut import shortcut
 from jaxplan.trajectory.spline import fit_polyline, fit_spline
 from jaxplan.trajectory.timing import Timing, evaluate, time_parameterize
 from jaxplan.trajectory.trajectory import Rung, Trajectory, make_trajectory
-from jaxplan.trajectory.validation import curve_points, line_points, points_free
+from jaxplan.trajectory.validation import SweptFree, Validation, points_free
 
 __all__ = [
     "Rung",
+    "SweptFree",
     "Timing",
     "Trajectory",
-    "curve_points",
+    "Validation",
     "evaluate",
     "fit_polyline",
     "fit_spline",
-    "line_points",
     "make_trajectory",
     "points_free",
     "shortcut",

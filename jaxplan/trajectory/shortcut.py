@@ -1,23 +1,25 @@
 """Shortcuts: replace a stretch of the path by a straight line that is free."""
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import jax
 import numpy as np
 
 from jaxplan.config import TrajectoryConfig
-from jaxplan.trajectory.spline import arc_length, at_arc_length
-from jaxplan.trajectory.validation import ConfigFree, line_points, points_free
+from jaxplan.trajectory.spline import arc_length, at_arc_length, fit_polyline
+from jaxplan.trajectory.validation import Validation
 
 _SMALLEST_SAVING = 1e-3  # [rad]; less is not worth a check
-_QUARTERS = np.array([0.25, 0.5, 0.75])[:, None]
+_INNER = np.arange(1, 16)[:, None] / 16.0  # where all candidates are asked
 
 
 def shortcut(
     paths: Sequence[np.ndarray],
     keys: jax.Array,
-    config_free: ConfigFree,
+    validation: Validation,
     config: TrajectoryConfig,
+    circular: np.ndarray | None = None,
 ) -> list[np.ndarray]:
     """Shortens paths by free straight lines (section 4.3).
 
@@ -26,19 +28,25 @@ def shortcut(
     the free line that saves most. The very first candidate is the whole path. Drawing
     depends on the path's key alone: neighbours in the batch change nothing.
 
-    To keep checks few, all candidates are asked at three inner points first; the rest
-    are asked in full from the largest saving down, until one is free.
+    On a circular joint a line goes the short way round, and what follows it is shifted
+    by the same full turns: q is then an angle that may leave [-pi, pi], and the path
+    ends at q_goal but for full turns.
+
+    To keep checks few, all candidates are asked at a few inner points first; those that
+    are left are asked in full from the largest saving down, until one is free.
 
     Args:
         paths: P arrays `[W_p, d]` of waypoints [rad].
         keys: `[P]` typed keys, one a path.
-        config_free: `(problem, q) -> Bool`, see `points_free`.
-        config: rounds, candidates and the check's resolution.
+        validation: what is free.
+        config: rounds and candidates.
+        circular: `Bool[d]` joints that live on a circle; None = none.
 
     Returns:
         P arrays `[W'_p, d]` with the same ends, none longer than it was.
     """
     paths = list(paths)
+    period = np.where(np.zeros(1) if circular is None else circular, 2.0 * np.pi, 0.0)
     if all(len(path) <= 2 for path in paths):
         return paths
     # Drawn on the host: a jitted draw would be compiled for every number of paths.
@@ -51,38 +59,50 @@ def shortcut(
             for pairs in shares:
                 pairs[0] = (0.0, 1.0)
         lines = {
-            p: _candidates(path, shares[p])
+            p: _candidates(path, shares[p], period)
             for p, path in enumerate(paths)
             if len(path) > 2
         }
-        for p, line in _longest_free(lines, config_free, config).items():
-            paths[p] = _splice(paths[p], *line)
+        for p, line in _longest_free(lines, validation).items():
+            paths[p] = _splice(paths[p], line)
     return paths
 
 
-_Line = tuple[float, float, np.ndarray, np.ndarray]
-"""A stretch (s_0, s_1) of the arc length and the path's points at its ends."""
+class _Line(NamedTuple):
+    """A stretch of the arc length, the line over it, and the turns of what follows."""
+
+    s_0: float
+    s_1: float
+    a: np.ndarray
+    b: np.ndarray
+    turns: np.ndarray
 
 
-def _candidates(path: np.ndarray, shares: np.ndarray) -> list[_Line]:
+def _candidates(
+    path: np.ndarray, shares: np.ndarray, period: np.ndarray
+) -> list[_Line]:
     """Candidate lines from `shares` `[C, 2]` of the length, by falling saving."""
     s = np.sort(shares, axis=1) * arc_length(path)[-1]
     a, b = at_arc_length(path, s[:, 0]), at_arc_length(path, s[:, 1])
+    turns = period * np.round((a - b) / np.where(period > 0.0, period, 1.0))
+    b = b + turns
     saving = s[:, 1] - s[:, 0] - np.linalg.norm(b - a, axis=1)
     order = np.argsort(-saving, kind="stable")
     return [
-        (s[i, 0], s[i, 1], a[i], b[i]) for i in order if saving[i] > _SMALLEST_SAVING
+        _Line(s[i, 0], s[i, 1], a[i], b[i], turns[i])
+        for i in order
+        if saving[i] > _SMALLEST_SAVING
     ]
 
 
 def _longest_free(
-    lines: dict[int, list[_Line]], config_free: ConfigFree, config: TrajectoryConfig
+    lines: dict[int, list[_Line]], validation: Validation
 ) -> dict[int, _Line]:
     """The first free line of each problem's list, for problems that have one."""
     problem = [p for p, candidates in lines.items() for _ in candidates]
     flat = [line for candidates in lines.values() for line in candidates]
-    inner = [a + _QUARTERS * (b - a) for _, _, a, b in flat]
-    hopeful = points_free(config_free, problem, inner, config.check_rows)
+    inner = [line.a + _INNER * (line.b - line.a) for line in flat]
+    hopeful = validation.points_free(problem, inner)
     waiting: dict[int, list[_Line]] = {}
     for p, line, hope in zip(problem, flat, hopeful, strict=True):
         if hope:
@@ -90,22 +110,17 @@ def _longest_free(
     taken = {}
     while waiting:
         first = {p: candidates.pop(0) for p, candidates in waiting.items()}
-        points = [
-            line_points(a, b, config.check_resolution)[int(s_0 == 0.0) :]
-            for s_0, _, a, b in first.values()
-        ]
-        free = points_free(config_free, list(first), points, config.check_rows)
+        curves = [fit_polyline(np.stack([line.a, line.b])) for line in first.values()]
+        free = validation.curves_free(list(first), curves)
         taken |= {p: first[p] for p, ok in zip(first, free, strict=True) if ok}
         waiting = {p: rest for p, rest in waiting.items() if rest and p not in taken}
     return taken
 
 
-def _splice(
-    path: np.ndarray, s_0: float, s_1: float, a: np.ndarray, b: np.ndarray
-) -> np.ndarray:
+def _splice(path: np.ndarray, line: _Line) -> np.ndarray:
     """`path` with the stretch between arc lengths s_0 and s_1 replaced by a line."""
-    along = arc_length(path)
-    before, after = path[along < s_0], path[along > s_1]
-    head = [path[0]] if s_0 == 0.0 else [*before, a]
-    tail = [path[-1]] if s_1 == along[-1] else [b, *after]
+    along, turned = arc_length(path), path + line.turns
+    before, after = path[along < line.s_0], turned[along > line.s_1]
+    head = [path[0]] if line.s_0 == 0.0 else [*before, line.a]
+    tail = [turned[-1]] if line.s_1 == along[-1] else [line.b, *after]
     return np.stack([*head, *tail])

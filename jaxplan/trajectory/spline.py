@@ -59,3 +59,15 @@ def fit_spline(path: np.ndarray, spline_step: float) -> BSpline:
     knots = np.concatenate([[0.0] * 3, breaks, [length] * 3])
     greville = (knots[1:-3] + knots[2:-2] + knots[3:-1]) / 3.0
     return BSpline(knots, at_arc_length(path, greville), 3)
+
+
+def bezier(curve: BSpline) -> np.ndarray:
+    """Control points `[n, 4, d]` of the cubic pieces of a curve of degree 1 or 3."""
+    breaks = np.unique(curve.t)
+    q = curve(breaks)
+    if curve.k == 1:
+        first = last = np.diff(q, axis=0)
+    else:
+        slope, span = curve(breaks, 1), np.diff(breaks)[:, None]
+        first, last = span * slope[:-1], span * slope[1:]
+    return np.stack([q[:-1], q[:-1] + first / 3.0, q[1:] - last / 3.0, q[1:]], axis=1)

@@ -10,20 +10,23 @@ end; a forward pass then takes the largest feasible u_i (Pham and Pham 2018). Ea
 bounds u by two parallel lines of slope -m_j = -q''_j / q'_j around 0, and all bounds of
 x are where two such lines meet: so every linear program has a closed form, written here
 for all problems at once. Accelerations bind at both ends of each interval (of constant
-u), as 2 d lines; what they exceed in between is measured afterwards on a finer grid and
-taken out by slowing the whole motion.
+u), as 2 d lines; what they exceed in between is measured afterwards and taken out by
+slowing the whole motion. It is little, as the grid is finer where the curve bends.
 """
 
 from collections.abc import Sequence
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 from scipy.interpolate import BSpline
 
-_GRID = 128  # intervals of a curve's timing, at least
+_GRID = 64  # intervals of a curve's timing, at least
+_SPAN = {1: 8, 3: 2}  # intervals of a span, at least, by the curve's degree
+_RISE = 0.001  # of q'_j above its chord within an interval, at most
 _SMALLEST_RATE = 1e-6  # stands for |dq_j/ds| of a joint that does not move
 _END = 1.0 - 1e-6  # of an interval: a corner's derivatives are those behind it
-_BETWEEN = np.array([0.0, 0.25, 0.5, 0.75, _END])  # where limits are measured
+_WITHIN = np.array([0.0, 0.25, 0.5, 0.75, _END])  # where limits are measured
 
 
 class Timing(NamedTuple):
@@ -61,8 +64,10 @@ def time_parameterize(
     velocity = np.broadcast_to(velocity, (len(curves), np.shape(velocity)[-1]))
     acceleration = np.broadcast_to(acceleration, velocity.shape)
 
-    x = _fastest(curves, s, rest, velocity[:, None], acceleration[:, None])
-    speed = np.sqrt(x) / _excess(curves, s, x, velocity, acceleration)[:, None]
+    dq, ddq = _derivatives(curves, s)
+    x = _fastest(s, rest, dq, ddq, velocity[:, None], acceleration[:, None])
+    excess = _excess(s, x, dq, ddq, velocity, acceleration)
+    speed = np.sqrt(x / excess[:, None])
     step, mean = np.diff(s), (speed[:, 1:] + speed[:, :-1]) / 2.0
     lasts = np.divide(step, mean, out=np.zeros_like(step), where=step > 0.0)
     return Timing(s, speed, np.pad(np.cumsum(lasts, axis=1), ((0, 0), (1, 0))))
@@ -89,68 +94,77 @@ def evaluate(
 
 
 def _grid(curve: BSpline) -> tuple[np.ndarray, np.ndarray]:
-    """Grid of s and where the motion must rest on it, each `[N+1]`."""
+    """Grid of s and where the motion must rest on it, each `[N+1]`.
+
+    It is finer where a curve bends: q'_j is a parabola on each span, and by as much as
+    that rises above its chord the acceleration may rise between an interval's ends.
+    """
     breaks = curve.t[curve.k : len(curve.t) - curve.k]
-    spans = len(breaks) - 1
+    span = np.diff(breaks)
+    rise = np.abs(np.diff(curve(breaks, 2), axis=0)).max(axis=1) * span / 8.0
+    least = np.maximum(_SPAN[curve.k], _GRID / len(span))
     # An even number of intervals: the middle of a straight line, where its speed peaks,
     # is then on the grid.
-    per_span = 2 * int(max(np.ceil(_GRID / 2 / spans), 8 if curve.k == 1 else 1))
-    share = np.arange(per_span) / per_span
-    s = (breaks[:-1, None] + share * np.diff(breaks)[:, None]).ravel()
+    counts = 2 * np.ceil(np.maximum(np.sqrt(rise / _RISE), least) / 2.0).astype(int)
+    share = np.concatenate([np.arange(n) / n for n in counts])
+    s = np.repeat(breaks[:-1], counts) + share * np.repeat(span, counts)
     s = np.append(s, breaks[-1])
     rest = np.zeros(len(s), bool)
-    rest[:: per_span if curve.k == 1 else len(s) - 1] = True
+    rest[[0, *np.cumsum(counts)] if curve.k == 1 else [0, -1]] = True
     return s, rest
 
 
 def _derivatives(
     curves: Sequence[BSpline], s: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """First and second derivative, `[P, n, d]`, at `s` `[P, n]`."""
-    rows = list(zip(curves, s, strict=True))
+    """First and second derivative `[P, N, B, d]` at `_WITHIN` of each interval."""
+    fine = s[:, :-1, None] + np.diff(s)[..., None] * _WITHIN
+    rows = list(zip(curves, fine, strict=True))
     return np.stack([c(r, 1) for c, r in rows]), np.stack([c(r, 2) for c, r in rows])
 
 
 def _fastest(
-    curves: Sequence[BSpline],
     s: np.ndarray,
     rest: np.ndarray,
+    dq: np.ndarray,
+    ddq: np.ndarray,
     velocity: np.ndarray,
     acceleration: np.ndarray,
 ) -> np.ndarray:
     """x `[P, N+1]` of the fastest motion: the two passes of TOPP-RA."""
-    dq, ddq = _derivatives(curves, s)
-    step = np.diff(s)[..., None]
-    dq_end, ddq_end = _derivatives(curves, s[:, :-1] + _END * step[..., 0])
+    twice = 2.0 * np.diff(s)[..., None]
     # At an interval's end x has become x + 2 step u.
     a, m = _lines(
-        np.concatenate([dq[:, :-1], dq_end + 2.0 * step * ddq_end], axis=-1),
-        np.concatenate([ddq[:, :-1], ddq_end], axis=-1),
+        np.concatenate([dq[:, :, 0], dq[:, :, -1] + twice * ddq[:, :, -1]], axis=-1),
+        np.concatenate([ddq[:, :, 0], ddq[:, :, -1]], axis=-1),
         np.concatenate([acceleration, acceleration], axis=-1),
     )
-
-    beta = np.min((velocity / np.maximum(np.abs(dq), _SMALLEST_RATE)) ** 2, axis=-1)
-    meet = m[..., None, :] - m[..., :, None]  # a lower line meets an upper one
-    room = a[..., None, :] + a[..., :, None]
-    fall = 2.0 * step * m - 1.0  # x_{i+1} >= 0 stays possible
-    beta[:, :-1] = np.min(
-        [
-            beta[:, :-1],
-            _quotient(room, meet).min(axis=(-2, -1)),
-            _quotient(2.0 * step * a, fall).min(axis=-1),
-        ],
-        axis=0,
-    )
+    limit = (velocity / np.maximum(np.abs(dq[:, :, 0]), _SMALLEST_RATE)) ** 2
+    one, other = np.triu_indices(a.shape[-1], 1)
+    # Where the lower line of one meets the upper line of another.
+    meet = _quotient(a[..., one] + a[..., other], np.abs(m[..., one] - m[..., other]))
+    stop = _quotient(twice * a, twice * m - 1.0)  # x_{i+1} >= 0 stays possible
+    bounds = [bound.min(axis=-1) for bound in (limit, meet, stop)]
+    beta = np.zeros_like(s)
+    beta[:, :-1] = np.min(bounds, axis=0)
     beta[rest] = 0.0
-    for i in reversed(range(step.shape[1])):
-        reach = beta[:, i + 1, None] + 2.0 * step[:, i] * a[:, i]
-        beta[:, i] = np.minimum(beta[:, i], _quotient(reach, -fall[:, i]).min(axis=-1))
+
+    # The passes go over intervals: these come first from here on. By each line x_{i+1}
+    # is at most gain x_i + gift.
+    gain, gift = np.moveaxis(1.0 - twice * m, 1, 0), np.moveaxis(twice * a, 1, 0)
+    gain, gift = np.ascontiguousarray(gain), np.ascontiguousarray(gift)
+    loss = _quotient(np.ones_like(gain), gain)
+    beta = np.ascontiguousarray(beta.T)[..., None]
+    least = partial(np.minimum.reduce, axis=-1, keepdims=True)
+    for i in reversed(range(len(gain))):
+        reach = least(loss[i] * (beta[i + 1] + gift[i]))
+        beta[i] = np.minimum(beta[i], reach)
 
     x = np.zeros_like(beta)
-    for i in range(step.shape[1]):
-        u = np.min(a[:, i] - m[:, i] * x[:, i, None], axis=-1)
-        x[:, i + 1] = np.clip(x[:, i] + 2.0 * step[:, i, 0] * u, 0.0, beta[:, i + 1])
-    return x
+    for i in range(len(gain)):
+        reach = least(gain[i] * x[i] + gift[i])
+        x[i + 1] = np.maximum(np.minimum(reach, beta[i + 1]), 0.0)
+    return x[..., 0].T
 
 
 def _lines(
@@ -167,23 +181,25 @@ def _quotient(bound: np.ndarray, slope: np.ndarray) -> np.ndarray:
 
 
 def _excess(
-    curves: Sequence[BSpline],
     s: np.ndarray,
     x: np.ndarray,
+    dq: np.ndarray,
+    ddq: np.ndarray,
     velocity: np.ndarray,
     acceleration: np.ndarray,
 ) -> np.ndarray:
-    """Factor `[P]` >= 1 by which the motion must be slower to keep the limits."""
-    step = np.diff(s)
-    twice_u = np.diff(x)
-    twice_u = np.divide(twice_u, step, out=np.zeros_like(step), where=step > 0.0)
-    fine = s[:, :-1, None] + step[..., None] * _BETWEEN
-    dq, ddq = _derivatives(curves, fine.reshape(len(s), -1))
-    x_fine = (x[:, :-1, None] + np.diff(x)[..., None] * _BETWEEN).reshape(len(s), -1, 1)
-    u_fine = np.repeat(twice_u / 2.0, len(_BETWEEN), axis=1)[..., None]
-    speeds = np.abs(dq) * np.sqrt(x_fine) / velocity[:, None]
-    accelerations = np.abs(ddq * x_fine + dq * u_fine) / acceleration[:, None]
-    excess = np.maximum(
-        speeds.max(axis=(1, 2)), np.sqrt(accelerations.max(axis=(1, 2)))
-    )
-    return np.maximum(excess, 1.0)
+    """Factor `[P]` >= 1 by which x is too large somewhere within the intervals.
+
+    A parabola rises above its five evenly spaced samples by at most 1/32 of what its
+    middle is away from its chord, twice; an acceleration is one, a speed's square
+    nearly.
+    """
+    step, rise = np.diff(s), np.diff(x)
+    u = np.divide(rise, 2.0 * step, out=np.zeros_like(step), where=step > 0.0)
+    x = (x[:, :-1, None] + rise[..., None] * _WITHIN)[..., None]
+    speeds = dq**2 * x / velocity[:, None, None] ** 2
+    accelerations = (ddq * x + dq * u[..., None, None]) / acceleration[:, None, None]
+    used = np.concatenate([speeds, accelerations], axis=-1)
+    between = np.abs(used[:, :, 0] - 2.0 * used[:, :, 2] + used[:, :, 4]) / 32.0
+    most = (np.abs(used).max(axis=2) + between).max(axis=(1, 2))
+    return np.maximum(most, 1.0)

@@ -12,7 +12,7 @@ from jaxplan.config import TrajectoryConfig
 from jaxplan.trajectory.shortcut import shortcut
 from jaxplan.trajectory.spline import fit_polyline, fit_spline
 from jaxplan.trajectory.timing import evaluate, time_parameterize
-from jaxplan.trajectory.validation import ConfigFree, curve_points, points_free
+from jaxplan.trajectory.validation import ConfigFree, SweptFree, Validation
 
 
 class Rung(enum.IntEnum):
@@ -26,8 +26,10 @@ class Rung(enum.IntEnum):
     """A cubic B-spline at a half or a quarter of `spline_step`."""
     POLYLINE = 3
     """The shortened path, at rest in its corners."""
-    INVALID = 4
-    """The polyline too, but a configuration of it is in collision: do not execute."""
+    PATH = 4
+    """The path as it was found, at rest in its corners."""
+    INVALID = 5
+    """That too, but a configuration of it is in collision: do not execute."""
 
 
 class Trajectory(NamedTuple):
@@ -58,15 +60,17 @@ def make_trajectory(
     velocity: np.ndarray,
     acceleration: np.ndarray,
     config: TrajectoryConfig,
+    circular: np.ndarray | None = None,
+    swept_free: SweptFree | None = None,
 ) -> Trajectory:
     """Smooths, validates and times P paths (section 4.3).
 
-    Each result depends on its own path, key and world only, not on its neighbours. The
-    start is not validated, since the robot is there already; nor are joint limits:
-    curves stay in the convex hull of their waypoints.
+    Each result depends on its own path, key and world only, not on its neighbours.
+    Joint limits are not validated: curves stay in the convex hull of their waypoints.
 
     Args:
-        paths: `[P, W, d]` waypoints [rad], padded behind `path_length`.
+        paths: `[P, W, d]` waypoints [rad], padded behind `path_length`; on circular
+            joints from one to the next by less than pi.
         path_length: `[P]` numbers of waypoints; 1 = stay.
         keys: `[P]` typed keys.
         config_free: `(problem: Int[R], q: [R, d]) -> Bool[R]` with `problem` in [0, P),
@@ -74,13 +78,22 @@ def make_trajectory(
         velocity: `[d]` or `[P, d]` the joints' velocity limits [rad/s].
         acceleration: `[d]` or `[P, d]` their acceleration limits [rad/s^2].
         config: steps, rounds and shares of the limits.
+        circular: `Bool[d]` joints that live on a circle; a motion may end at full turns
+            from where its path does. None = none.
+        swept_free: `(problem: Int[R], q: [R, d], motion: [R, d]) -> Bool[R]`, called
+            likewise, then instead of `config_free`: True proves all configurations
+            free whose joints are within `motion` of q. With it curves are free all
+            along, without at points no more than `config.check_resolution` apart.
     """
-    waypoints = [
+    found = [
         np.array(path[: max(n, 1)], np.float64)
         for path, n in zip(np.asarray(paths), np.asarray(path_length), strict=True)
     ]
-    waypoints = shortcut(waypoints, keys, config_free, config)
-    curves, rung = _choose_curves(waypoints, config_free, config)
+    validation = Validation(
+        config_free, swept_free, config.check_rows, config.check_resolution
+    )
+    short = shortcut(found, keys, validation, config, circular)
+    curves, rung = _choose_curves(found, short, validation, config.spline_step)
     return _sample(
         curves,
         rung,
@@ -91,28 +104,31 @@ def make_trajectory(
 
 
 def _choose_curves(
-    paths: Sequence[np.ndarray], config_free: ConfigFree, config: TrajectoryConfig
+    found: Sequence[np.ndarray],
+    short: Sequence[np.ndarray],
+    validation: Validation,
+    spline_step: float,
 ) -> tuple[list[BSpline], np.ndarray]:
     """Goes down the ladder of `Rung` until each curve is free."""
-    curves = [fit_polyline(path) for path in paths]
-    rung = np.full(len(paths), Rung.INVALID)
-    lines = {p for p, path in enumerate(paths) if len(path) <= 2}
-    bent = set(range(len(paths))) - lines
+    curves = [fit_polyline(path) for path in found]
+    rung = np.full(len(found), Rung.INVALID)
+    lines = {p for p, path in enumerate(short) if len(path) <= 2}
+    bent = set(range(len(short))) - lines
     ladder = (
-        (Rung.LINE, lines, None),
-        (Rung.SPLINE, bent, config.spline_step),
-        (Rung.DENSER, bent, config.spline_step / 2),
-        (Rung.DENSER, bent, config.spline_step / 4),
-        (Rung.POLYLINE, bent, None),
+        (Rung.LINE, lines, short, None),
+        (Rung.SPLINE, bent, short, spline_step),
+        (Rung.DENSER, bent, short, spline_step / 2),
+        (Rung.DENSER, bent, short, spline_step / 4),
+        (Rung.POLYLINE, bent, short, None),
+        (Rung.PATH, lines | bent, found, None),
     )
-    for step_down, group, spline_step in ladder:
+    for step_down, group, paths, spacing in ladder:
         waiting = [p for p in sorted(group) if rung[p] == Rung.INVALID]
         tried = [
-            curves[p] if spline_step is None else fit_spline(paths[p], spline_step)
+            fit_polyline(paths[p]) if spacing is None else fit_spline(paths[p], spacing)
             for p in waiting
         ]
-        points = [curve_points(curve, config.check_resolution) for curve in tried]
-        free = points_free(config_free, waiting, points, config.check_rows)
+        free = validation.curves_free(waiting, tried)
         for p, curve, ok in zip(waiting, tried, free, strict=True):
             if ok:
                 curves[p], rung[p] = curve, step_down

@@ -1,0 +1,21 @@
+"""Refuses to work in a forked child: JAX's threads stay behind, and a question would hang."""
+
+import os
+
+_home: int | None = None
+"""The process that used JAX first."""
+
+
+def refuse_fork() -> None:
+    """Every door that uses JAX calls this.
+
+    Raises:
+        RuntimeError: The process was forked from one that has used JAX.
+    """
+    global _home
+    _home = os.getpid() if _home is None else _home
+    if _home != os.getpid():
+        raise RuntimeError(
+            "JAX does not work in a process forked from one that has used it: start "
+            'processes by spawn, multiprocessing.get_context("spawn")'
+        )
