@@ -580,13 +580,13 @@ def slotted() -> Scene:
     [
         (
             Obstacle("boxx", [0.1] * 3, POSE),
-            "no kind of obstacle 'boxx': did you mean 'box'",
+            "no kind of slot 'boxx': did you mean 'box'",
         ),
         (
             Obstacle("mesh", [0.1], POSE),
-            "no kind of obstacle 'mesh': there are sphere, ",
+            "no kind of slot 'mesh': there are sphere, ",
         ),
-        (Obstacle(3, [0.1], POSE), "no kind of obstacle '3'"),
+        (Obstacle(3, [0.1], POSE), "no kind of slot '3'"),
         (("box", [0.1] * 3, POSE), "is no Obstacle"),
         (None, "is no Obstacle"),
     ],

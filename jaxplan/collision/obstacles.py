@@ -61,7 +61,7 @@ def _checked(obstacle: Obstacle) -> tuple[np.ndarray, np.ndarray]:
     """Its size, and its pose `[7]`."""
     if not isinstance(obstacle, Obstacle):
         raise ValueError(f"{obstacle!r} is no Obstacle(kind, size, pose)")
-    names = SIZES[known(str(obstacle.kind), "kind of obstacle", tuple(SIZES))]
+    names = SIZES[known(str(obstacle.kind), "kind of slot", tuple(SIZES))]
     size, pose = _floats(obstacle.size), _floats(obstacle.pose)
     wanted = " and ".join(dict.fromkeys(names))
     if size.shape != (len(names),) or not (size > 0).all() or not _finite(size):
