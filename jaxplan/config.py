@@ -63,7 +63,7 @@ class PlannerConfig(Checked):
     one nearer to q_toggle is the base of a learned proposal (section 4.3); 0 = off."""
     balance: bool = True
     """RRT-Connect's smaller tree grows until it has half of the other's nodes; off: in turn."""
-    dynamic_domain: NotNegative = 4.0
+    dynamic_domain: NotNegative = 3.0
     """Of a node whose motion was blocked: farther samples than this [rad] do not come to it, see
     `planning.domain`; 0 = off."""
     metric: tuple[Positive, ...] | None = None
