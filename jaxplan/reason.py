@@ -14,7 +14,7 @@ from jaxplan.scene import Scene
 
 UNITS = {"hinge": "rad", "slide": "m"}
 """Of a joint's position, by its kind."""
-ENCLOSED = 100
+ENCLOSED = 1000
 """Expansions in which a tree should have grown."""
 
 

@@ -100,7 +100,7 @@ def advance(
     else:
         side = jnp.where(was, control.side, side)
     return Control(
-        side=jnp.where(onward | following, control.side, side),
+        side=jnp.where(onward | met | following, control.side, side),
         connecting=following | grown | onward,
         following=following,
         chained=following | onward,

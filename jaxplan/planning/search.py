@@ -66,8 +66,8 @@ def examine(query: Query, space: Space) -> tuple[Query, jax.Array]:
     """
     given = jnp.stack([*query[:3], *jnp.moveaxis(query.goals, 1, 0)])
     finite = jnp.all(jnp.isfinite(given), axis=(0, 2))
-    middle = np.nan_to_num(0.5 * (space.q_min + space.q_max), posinf=0, neginf=0)
-    given = jnp.where(finite[:, None], given, middle)
+    inside = np.clip(0.0, space.q_min, space.q_max)
+    given = jnp.where(finite[:, None], given, inside)
     q_start, q_goal, q_toggle = given[:3]
     goals = jnp.moveaxis(given[3:], 0, 1)
     query = Query(q_start, q_goal, q_toggle, query.key, query.bound, goals)
