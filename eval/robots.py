@@ -116,6 +116,9 @@ def main(args: Args) -> None:
         result = {"robots": [asdict(row) for row in rows], "versions": versions()}
         args.out.write_text(json.dumps(result, indent=1) + "\n")
     show(rows)
+    for row in rows:
+        for line in row.untrue:
+            print(f"{row.name}: {line}")
     print(f"written to {args.out}")
 
 
@@ -195,8 +198,10 @@ def solve(planner: Planner, world: World, q: np.ndarray, row: Row, args: Args) -
             row.refused += bool(true)
             if not true:
                 row.untrue.append(f"problem {i}: {plan.reason}, but {pair} {depth}")
+        elif name in ("BUDGET_EXHAUSTED", "TIME_OUT"):
+            row.refused += 1
         else:
-            row.refused += bool(plan.reason)
+            row.untrue.append(f"problem {i}: {plan.reason}")
 
 
 def show(rows: list[Row]) -> None:

@@ -32,7 +32,7 @@ class PlannerConfig(Checked):
 
     method: Literal["rrt", "rrt_connect", "ao_rrt_connect"] = "rrt_connect"
     """`ao_rrt_connect` uses all of `max_expansions` to find ever shorter paths."""
-    max_expansions: Count = 20_000
+    max_expansions: Count = 50_000
     """N_rrt: proposals whose motion is checked, each connect step included."""
     p_uniform: Probability = 0.2
     """Probability that a proposal is a uniform segment and not a learned one, if there is a
@@ -63,7 +63,7 @@ class PlannerConfig(Checked):
     one nearer to q_toggle is the base of a learned proposal (section 4.3); 0 = off."""
     balance: bool = True
     """RRT-Connect's smaller tree grows until it has half of the other's nodes; off: in turn."""
-    dynamic_domain: NotNegative = 4.0
+    dynamic_domain: NotNegative = 3.0
     """Of a node whose motion was blocked: farther samples than this [rad] do not come to it, see
     `planning.domain`; 0 = off."""
     metric: tuple[Positive, ...] | None = None

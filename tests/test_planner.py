@@ -108,6 +108,10 @@ def test_every_answer_is_solved_and_certified(planner, questions, answers):
         assert certificate.valid
         assert certificate.clearance > 0
     assert sum(len(answer.path) > 2 for answer in answers) > 5
+    # Planned without a margin, so that not each is free between its samples.
+    proofs = [planner.certify(answer, continuous=True) for answer in answers]
+    assert sum(bool(proof.proven) for proof in proofs) > len(proofs) / 2
+    assert all(proof.valid == proof.proven for proof in proofs)
 
 
 def test_alone_or_in_any_batch_the_answer_is_the_same(planner, questions, answers):

@@ -41,6 +41,10 @@ from jaxplan.planning.tree import (
 )
 
 METHODS = {"rrt": rrt, "rrt_connect": rrt_connect, "ao_rrt_connect": rrt_connect}
+NARROW = 4
+"""Workers of a problem's first rounds."""
+WIDENING = 16
+"""There is one worker to so many expansions that went before, up to all of them."""
 FINEST = 8
 """Halvings of the resolution at most."""
 LIMIT_SLACK = 1e-4
@@ -158,6 +162,7 @@ def advance(
         draw, most = bounded.informed(draw, query, control.side, space)
         most = jnp.where(control.connecting, jnp.inf, most)
     running = able[:, None] & (number < config.max_expansions)
+    running &= worker < _width(state, config)[:, None]
     if bank is None:
         asking, segment = jnp.zeros_like(running), draw.segment
         waiting = jnp.zeros_like(able)
@@ -257,6 +262,17 @@ def _base(
     return jnp.where(move.learned, tied, anchor), least
 
 
+def _width(state: State, config: PlannerConfig) -> jax.Array:
+    """`[P]` workers that take part: few at first, for an easy problem is soon over.
+
+    The very first expansions are the straight motions to the goals.
+    """
+    goals = 1 + state.query.goals.shape[1]
+    grown = jnp.maximum(NARROW, state.expansions // WIDENING)
+    width = jnp.where(state.expansions < goals, goals, grown)
+    return jnp.minimum(width, config.workers)
+
+
 def _finer(state: State) -> jax.Array:
     """`[P, 1]` factor on the number of checked configurations: what was refused was too coarse."""
     return jnp.exp2(jnp.minimum(state.attempt, FINEST).astype(jnp.float32))[:, None]
@@ -289,7 +305,7 @@ def _check(
 
 def rows_for(lanes: int, config: PlannerConfig) -> int:
     """Configurations of one call: a single search has few at a time."""
-    return min(config.check_rows, max(64, 8 * lanes * config.workers))
+    return min(config.check_rows, max(32, 2 * lanes * config.workers))
 
 
 def waypoints(config: PlannerConfig) -> int:

@@ -198,32 +198,32 @@ def extract_path(
     Returns:
         `path [P, W, d]` with the last point repeated, and `path_length [P]`, uncut.
     """
-    there, n_there = _lineage(tree, node)
-    onward, n_onward = _lineage(tree, joint)
+    there, n_there = _lineage(tree, node, waypoints)
+    onward, n_onward = _lineage(tree, joint, waypoints)
     length = n_there + jnp.maximum(n_onward - 1, 0)
-    capacity = tree.parent.shape[1]
     step = jnp.arange(waypoints, dtype=jnp.int32)
     step = jnp.minimum(step, jnp.maximum(length - 1, 0)[:, None])
     back = n_there[:, None] - 1 - step  # there[] runs from the node to the root
     index = jnp.where(
         back >= 0,
-        at(there, jnp.maximum(back, 0)),
-        at(onward, jnp.clip(-back, 0, capacity - 1)),
+        at(there, jnp.clip(back, 0, waypoints - 1)),
+        at(onward, jnp.clip(-back, 0, waypoints - 1)),
     )
     return configurations(tree, index), length
 
 
-def _lineage(tree: Tree, node: jax.Array) -> tuple[jax.Array, jax.Array]:
-    """Indices `[P, N]` from `node [P]` up to its root, and how many; none for node < 0."""
+def _lineage(tree: Tree, node: jax.Array, room: int) -> tuple[jax.Array, jax.Array]:
+    """Indices `[P, room]` from `node [P]` up to its root, and how many; none for node < 0."""
 
     def climb(carry):
         depth, node, line, length = carry
-        line = line.at[:, depth].set(jnp.maximum(node, 0))
+        line = line.at[:, depth].set(jnp.maximum(node, 0), mode="drop")
         length = length + (node >= 0)
         parent = at(tree.parent, jnp.maximum(node, 0))
         return depth + 1, jnp.where(node >= 0, parent, NO_PARENT), line, length
 
-    line, length = jnp.zeros_like(tree.parent), jnp.zeros_like(node)
+    line = jnp.zeros((len(node), room), jnp.int32)
+    length = jnp.zeros_like(node)
     carry = (jnp.int32(0), node, line, length)
     _, _, line, length = jax.lax.while_loop(lambda c: jnp.any(c[1] >= 0), climb, carry)
     return line, length
