@@ -156,7 +156,7 @@ def test_a_geom_of_explicit_pairs_meets_every_slot():
 
 
 def test_the_planner_answers_whole_questions():
-    scene, world = build(Case(("capsule",), ("mesh",), ("cylinder",)))
+    scene, world = build(Case(("box",), (), ("capsule",)))
     planner = jaxplan.Planner(scene)
     rng = np.random.default_rng(1)
     q = rng.uniform(scene.q_min, scene.q_max, (200, 3))
@@ -178,7 +178,9 @@ q = near(scene, world, 4)
 assert q.dtype == np.float32 and scene.model.geom_pos.dtype == np.float64
 for rows in (q, q.astype(float)):
     assert jax.eval_shape(clearance, scene, world, rows).dtype == np.float32
-assert jax.eval_shape(config_free, scene, world, q, 0.01).dtype == bool
+for motion in (None, 0.1 + 0.0 * q):
+    free = jax.eval_shape(config_free, scene, world, q, 0.01, motion=motion)
+    assert free.dtype == bool
 scene, world = build(SMALL[0])
 ask = jax.jit(clearance, compiler_options=QUICK)
 assert np.isfinite(ask(scene, world, near(scene, world, 4))).all()

@@ -26,7 +26,7 @@ HINGE, SLIDE = mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE
 ROWS = 400
 BAND = 1e-5
 ask = jax.jit(config_free, static_argnums=4, compiler_options=QUICK)
-distance = jax.jit(clearance, compiler_options=QUICK)
+distance = jax.jit(clearance, static_argnums=3, compiler_options=QUICK)
 most = jax.jit(motion_bound, compiler_options=QUICK)
 ALL = ("sphere", "capsule", "ellipsoid", "cylinder", "box", "mesh")
 
@@ -171,7 +171,11 @@ def test_what_is_far_for_its_motion_is_proven(drawn: Case):
     far = least > bound + BAND
     assert far.mean() > 0.02
     assert np.asarray(ask(scene, world, q, 0.0, "fast", motion))[far].all()
+    lower = np.asarray(distance(scene, world, q, "fast", motion))
     for margin in (0.0, 0.02):
+        proven = np.asarray(ask(scene, world, q, margin, "fast", motion))
+        clear = np.abs(lower - margin) > BAND
+        np.testing.assert_array_equal(proven[clear], (lower > margin)[clear])
         still = np.asarray(ask(scene, world, q, margin, "fast", 0 * q))
         clear = np.abs(least - margin) > BAND
         np.testing.assert_array_equal(still[clear], (least > margin)[clear])
@@ -324,3 +328,15 @@ def test_held_things_hang_on_the_hand():
     np.testing.assert_allclose([bounds[t, post], bounds[t, g]], [0.07, 0], atol=1e-6)
     free = pair_motion_bounds(scene, held._replace(held=~held.held), [0.1])
     np.testing.assert_allclose(free[t, post], 0, atol=1e-6)
+
+
+def test_the_reference_backend_takes_off_the_table():
+    scene = Scene.from_mjcf(STRETCHED)
+    world, q = make_world(scene), np.linspace(-3, 3, 60).reshape(30, 2)
+    motion = np.full((30, 2), 0.1)
+    least = np.asarray(distance(scene, world, q))
+    bound = np.asarray(most(scene, world, motion))
+    for margin in (float(np.median(least - bound)), 0.0):
+        proven = np.asarray(ask(scene, world, q, margin, "mjx", motion))
+        clear = np.abs(least - bound - margin) > 1e-4
+        np.testing.assert_array_equal(proven[clear], (least - bound > margin)[clear])
