@@ -26,7 +26,7 @@ from jaxplan.config import PlannerConfig
 from jaxplan.evaluation import versions, wilson
 from jaxplan.evaluation.motion_bench import (
     data_directory,
-    panda_mjcf,
+    robot_mjcf,
     read_problems,
     read_robot,
 )
@@ -123,7 +123,7 @@ def planned(args: Args) -> Iterator[Planned]:
     robot, sets = read_robot(args.data), read_problems(args.data)
     planners = {}
     for name, problems in sets.items():
-        scene = Scene.from_mjcf(panda_mjcf(robot), slots=slots_for(problems))
+        scene = Scene.from_mjcf(robot_mjcf(robot), slots=slots_for(problems))
         planners[name] = Planner(scene, PlannerConfig(margin=args.margin))
     longest = max(map(len, sets.values()))
     for number in count():

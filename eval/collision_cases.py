@@ -13,7 +13,7 @@ from jaxplan.collision.positions import carry, qpos_rows
 from jaxplan.evaluation.motion_bench import (
     Problem,
     obstacles_mjcf,
-    panda_mjcf,
+    robot_mjcf,
     read_problems,
     read_robot,
     sphere_cage,
@@ -51,10 +51,10 @@ def panda_cases(data: Path, rows: int) -> Iterator[Case]:
     """
     robot = read_robot(data)
     for problem in (sphere_cage(), table()):
-        scene = Scene.from_mjcf(panda_mjcf(robot, obstacles_mjcf(problem.obstacles)))
+        scene = Scene.from_mjcf(robot_mjcf(robot, obstacles_mjcf(problem.obstacles)))
         yield _panda_case(problem.set, robot, problem, scene, make_world(scene), rows)
     problem = read_problems(data)[SET][0]
-    scene = Scene.from_mjcf(panda_mjcf(robot), slots=slots_for([problem]))
+    scene = Scene.from_mjcf(robot_mjcf(robot), slots=slots_for([problem]))
     world = make_world(scene, obstacles=problem.obstacles)
     yield _panda_case(f"{SET} in slots", robot, problem, scene, world, rows)
 

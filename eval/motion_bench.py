@@ -1,6 +1,7 @@
 """MotionBenchMaker's problems: solved, how fast, how long, and certified by C MuJoCo.
 
     python eval/motion_bench.py --out runs/motion_bench.json
+    python eval/motion_bench.py --robot fetch --out runs/motion_bench_fetch.json
 
 One planner a set; the obstacles of its problems take turns in slots, so that nothing
 compiles between problems. OMPL with C MuJoCo gets the same problems beside it. Paths are
@@ -11,6 +12,7 @@ import json
 import os
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 from peers import peer_versions
@@ -30,7 +32,8 @@ class Args:
 
     out: Path = Path("runs/motion_bench.json")
     data: Path = field(default_factory=data_directory)
-    """Directory with the Panda's spheres and the problems."""
+    """Directory with the robots' spheres and the problems."""
+    robot: Literal["panda", "fetch"] = "panda"
     quick: bool = False
     """5 problems a set."""
     sets: tuple[str, ...] = ()
@@ -39,7 +42,8 @@ class Args:
 
 def main(args: Args) -> None:
     """Measures, prints a table, writes JSON."""
-    robot, every = read_robot(args.data), read_problems(args.data)
+    robot = read_robot(args.data, args.robot)
+    every = read_problems(args.data, args.robot)
     if unknown := set(args.sets) - set(every):
         raise ValueError(f"no set {min(unknown)!r}: there are {', '.join(every)}")
     load = os.getloadavg()

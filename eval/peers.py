@@ -13,7 +13,7 @@ import mujoco
 import numpy as np
 
 from jaxplan.collision import Obstacle
-from jaxplan.evaluation.motion_bench import Problem, obstacles_mjcf, panda_mjcf
+from jaxplan.evaluation.motion_bench import Problem, obstacles_mjcf, robot_mjcf
 
 PACKAGES = "ompl", "pybullet", "torch"
 
@@ -47,7 +47,7 @@ def peer_model(robot: dict, obstacles: Iterable[Obstacle]) -> mujoco.MjModel:
     """
     geoms = obstacles_mjcf(obstacles).splitlines()
     bodies = "".join(f"<body>{geom}</body>\n" for geom in geoms)
-    model = mujoco.MjModel.from_xml_string(panda_mjcf(robot, bodies))
+    model = mujoco.MjModel.from_xml_string(robot_mjcf(robot, bodies))
     model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_MIDPHASE
     return model
 

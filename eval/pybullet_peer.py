@@ -82,7 +82,7 @@ class PybulletChecker:
 
 
 def panda_urdf(robot: dict) -> str:
-    """The Panda as URDF: what `panda_mjcf` is as MJCF.
+    """The Panda as URDF: what `robot_mjcf` is as MJCF.
 
     Args:
         robot: What `motion_bench.read_robot` gives.

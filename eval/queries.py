@@ -17,7 +17,7 @@ from tqdm import tqdm
 
 from jaxplan.collision import World, certify, make_world
 from jaxplan.config import PlannerConfig
-from jaxplan.evaluation.motion_bench import Problem, obstacles_mjcf, panda_mjcf
+from jaxplan.evaluation.motion_bench import Problem, obstacles_mjcf, robot_mjcf
 from jaxplan.planner import Planner
 from jaxplan.scene import Scene
 
@@ -46,7 +46,7 @@ def planner_for(
         scene = _scene(robot, problems[0])
         worlds = [make_world(scene)] * len(problems)
     else:
-        scene = Scene.from_mjcf(panda_mjcf(robot), slots=slots_for(problems))
+        scene = Scene.from_mjcf(robot_mjcf(robot), slots=slots_for(problems))
         worlds = [make_world(scene, obstacles=p.obstacles) for p in problems]
     return Planner(scene, PlannerConfig(margin=0.0)), worlds
 
@@ -114,7 +114,7 @@ def length(path: np.ndarray) -> float:
 
 
 def _scene(robot: dict, problem: Problem) -> Scene:
-    return Scene.from_mjcf(panda_mjcf(robot, obstacles_mjcf(problem.obstacles)))
+    return Scene.from_mjcf(robot_mjcf(robot, obstacles_mjcf(problem.obstacles)))
 
 
 def _ompl_sides(

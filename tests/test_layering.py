@@ -19,6 +19,7 @@ LAYERS = (
     {"samplers", "simulation", "motion", "pose"},
     {"descent"},
     {"ik", "plan", "questions"},
+    {"compiled", "goals"},
     {"reason"},
     {"planner"},
     {"tasks", "learning", "policies"},

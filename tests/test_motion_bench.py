@@ -9,7 +9,7 @@ from jaxplan.evaluation.motion_bench import (
     HOME,
     data_directory,
     obstacles_mjcf,
-    panda_mjcf,
+    robot_mjcf,
     read_problems,
     read_robot,
     sphere_cage,
@@ -30,7 +30,7 @@ def robot() -> dict:
 
 
 def model_of(robot, obstacles=()) -> mujoco.MjModel:
-    return mujoco.MjModel.from_xml_string(panda_mjcf(robot, obstacles_mjcf(obstacles)))
+    return mujoco.MjModel.from_xml_string(robot_mjcf(robot, obstacles_mjcf(obstacles)))
 
 
 def free(model, q) -> bool:

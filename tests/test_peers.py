@@ -56,10 +56,10 @@ def test_what_is_not_installed_is_said_and_not_raised():
 def test_the_peers_layout_changes_no_verdict(robot, problems):
     from peers import peer_model
 
-    from jaxplan.evaluation.motion_bench import obstacles_mjcf, panda_mjcf
+    from jaxplan.evaluation.motion_bench import obstacles_mjcf, robot_mjcf
 
     for problem in problems:
-        text = panda_mjcf(robot, obstacles_mjcf(problem.obstacles))
+        text = robot_mjcf(robot, obstacles_mjcf(problem.obstacles))
         plain = mujoco.MjModel.from_xml_string(text)
         rows = np.random.default_rng(0).uniform(*plain.jnt_range.T, (300, 7))
         np.testing.assert_array_equal(

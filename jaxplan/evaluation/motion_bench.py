@@ -1,10 +1,11 @@
 """Planning problems that others are measured on: MotionBenchMaker, a cage, a table.
 
-The robot is the Panda as 59 spheres. It comes as MJCF text, so that MuJoCo's own checker
-and every peer see the geoms that we see.
+The robots are the Panda as 59 spheres and the Fetch as 111, its torso's slide among its eight
+joints. They come as MJCF text, so that MuJoCo's own checker and every peer see the geoms
+that we see.
 
-MotionBenchMaker (Chamzas et al. 2021) is not part of the package: its two files, as the
-VAMP project distributes them, lie in `data_directory()`.
+MotionBenchMaker (Chamzas et al. 2021) is not part of the package: its two files for each
+robot, as the VAMP project distributes them, lie in `data_directory()`.
 """
 
 import json
@@ -19,7 +20,7 @@ import numpy as np
 from jaxplan.collision import Obstacle
 
 HOME = (0, -0.785, 0, -2.356, 0, 1.571, 0.785)
-"""Where the arm rests [rad]: the start of all of MotionBenchMaker's problems."""
+"""Where the Panda rests [rad]: the start of all of its problems in MotionBenchMaker."""
 
 
 class Problem(NamedTuple):
@@ -29,9 +30,9 @@ class Problem(NamedTuple):
     index: int
     """Its number in the set."""
     q_start: np.ndarray
-    """`[7]` [rad]."""
+    """`[d]` [rad or m]."""
     q_goal: np.ndarray
-    """`[7]` [rad]."""
+    """`[d]` [rad or m]."""
     obstacles: tuple[Obstacle, ...]
 
 
@@ -41,22 +42,24 @@ def data_directory() -> Path:
     return Path(os.environ.get("JAXPLAN_MOTION_BENCH", default))
 
 
-def read_robot(directory: str | os.PathLike) -> dict:
-    """The Panda's spheres, joints and pairs of links that are never checked.
+def read_robot(directory: str | os.PathLike, name: str = "panda") -> dict:
+    """A robot's spheres, joints and pairs of links that are never checked.
 
     Raises:
-        FileNotFoundError: The directory lacks `panda_spheres.json`.
+        FileNotFoundError: The directory lacks its file, such as `panda_spheres.json`.
     """
-    return _read(directory, "panda_spheres.json")
+    return _read(directory, f"{name}_spheres.json")
 
 
-def read_problems(directory: str | os.PathLike) -> dict[str, list[Problem]]:
+def read_problems(
+    directory: str | os.PathLike, name: str = "panda"
+) -> dict[str, list[Problem]]:
     """The problems of each set, in its order, with the first of their goals.
 
     Raises:
-        FileNotFoundError: The directory lacks `panda_problems.json`.
+        FileNotFoundError: The directory lacks its file, such as `panda_problems.json`.
     """
-    sets = _read(directory, "panda_problems.json")["problems"]
+    sets = _read(directory, f"{name}_problems.json")["problems"]
     return {
         name: [
             _problem(name, p["index"], p["start"], p["goals"][0], _obstacles(p))
@@ -66,10 +69,10 @@ def read_problems(directory: str | os.PathLike) -> dict[str, list[Problem]]:
     }
 
 
-def panda_mjcf(robot: dict, obstacles: str = "") -> str:
-    """The Panda as MJCF: its links by name, spheres for geoms, key frame `home`.
+def robot_mjcf(robot: dict, obstacles: str = "") -> str:
+    """The robot as MJCF: its links by name, spheres for geoms; the Panda with a key frame `home`.
 
-    Hand and fingers are welded to the last link, as the sphere model has them.
+    Hand and fingers are welded to the last link, as the sphere models have them.
 
     Args:
         robot: What `read_robot` gives.
@@ -88,7 +91,7 @@ def panda_mjcf(robot: dict, obstacles: str = "") -> str:
             body(
                 j["child"],
                 f' pos="{_row(j["xyz"])}" euler="{_row(j["rpy"])}"',
-                _hinge(j) if j["type"] == "revolute" else "",
+                "" if j["type"] == "fixed" else _joint(j),
             )
             for j in joints[link]
         )
@@ -97,20 +100,23 @@ def panda_mjcf(robot: dict, obstacles: str = "") -> str:
     excluded = "".join(
         f'<exclude body1="{a}" body2="{b}"/>\n' for a, b in robot["disable_collisions"]
     )
+    root = next(iter(set(robot["links"]) - {j["child"] for j in robot["joints"]}))
+    moving = [joint for joint in robot["joints"] if joint["type"] != "fixed"]
+    home = f'<key name="home" qpos="{_row(HOME)}"/>' if len(moving) == len(HOME) else ""
     # Capital XYZ: rpy turns about the axes of the parent, which stay where they are.
-    return f"""<mujoco model="panda as spheres">
+    return f"""<mujoco model="a robot as spheres">
 <compiler angle="radian" eulerseq="XYZ"/>
 <worldbody>
-{body("panda_link0")}{obstacles}</worldbody>
+{body(root)}{obstacles}</worldbody>
 <contact>
 {excluded}</contact>
-<keyframe><key name="home" qpos="{_row(HOME)}"/></keyframe>
+<keyframe>{home}</keyframe>
 </mujoco>
 """
 
 
 def obstacles_mjcf(obstacles: Iterable[Obstacle]) -> str:
-    """Geoms at rest, for `panda_mjcf`."""
+    """Geoms at rest, for `robot_mjcf`."""
     return "".join(
         f'<geom name="{o.kind}{i}" type="{o.kind}" size="{_row(o.size)}" '
         f'pos="{_row(o.pose[:3])}" quat="{_row(o.pose[3:])}"/>\n'
@@ -190,9 +196,11 @@ def _problem(
     return Problem(name, index, q_start, q_goal, tuple(obstacles))
 
 
-def _hinge(joint: dict) -> str:
+def _joint(joint: dict) -> str:
+    kind = {"revolute": "hinge", "prismatic": "slide"}[joint["type"]]
     axis, limits = _row(joint["axis"]), _row(joint["limit"])
-    return f'<joint name="{joint["name"]}" axis="{axis}" range="{limits}"/>\n'
+    name = joint["name"]
+    return f'<joint name="{name}" type="{kind}" axis="{axis}" range="{limits}"/>\n'
 
 
 def _row(numbers: Iterable[float]) -> str:
