@@ -26,9 +26,9 @@ from jaxplan.config import PlannerConfig
 from jaxplan.evaluation import versions, wilson
 from jaxplan.evaluation.motion_bench import (
     data_directory,
-    robot_mjcf,
     read_problems,
     read_robot,
+    robot_mjcf,
 )
 from jaxplan.planner import Planner
 from jaxplan.scene import Scene

@@ -13,9 +13,9 @@ from jaxplan.collision.positions import carry, qpos_rows
 from jaxplan.evaluation.motion_bench import (
     Problem,
     obstacles_mjcf,
-    robot_mjcf,
     read_problems,
     read_robot,
+    robot_mjcf,
     sphere_cage,
     table,
 )

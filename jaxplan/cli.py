@@ -57,6 +57,8 @@ class Plan:
     """Of each joint at most [rad/s or m/s]."""
     acceleration: float = 2.0
     """Of each joint at most [rad/s^2 or m/s^2]."""
+    time_limit: float | None = None
+    """After so long the search gives up [s]."""
 
 
 @dataclass(frozen=True)

@@ -144,11 +144,25 @@ def _contact(scene: Scene, world: World, q: np.ndarray, margin: float) -> str:
     if not poses[:, 3:].any(-1).all():
         return "the world has a quaternion of zeros"
     pair, distance = collision.closest_pair(scene, world, q, 0.01)
+    hint = "" if pair is None else _hint(scene, pair)
     if pair is None:
         return "nothing within 10 mm by C MuJoCo"
     if distance >= 0:
         return (
             f"{pair[0]} and {pair[1]} are {1000 * distance:.2f} mm apart, "
-            f"margin {1000 * margin:.2f} mm"
+            f"margin {1000 * margin:.2f} mm{hint}"
         )
-    return f"{pair[0]} and {pair[1]}, {-1000 * distance:.2f} mm deep"
+    return f"{pair[0]} and {pair[1]}, {-1000 * distance:.2f} mm deep{hint}"
+
+
+def _hint(scene: Scene, pair: tuple[str, str]) -> str:
+    """What helps where two parts of the robot touch wherever it is."""
+    groups = {frozenset(names): group for group, *names in scene.pairs}
+    name = groups.get(frozenset(pair), "")
+    for group in scene.groups:
+        bodies = [side.body for side in group.contacts[0]]
+        moved = [scene.structure.moved & {*scene.line(body)} for body in bodies]
+        if group.name == name and all(moved):
+            a, b = (scene.structure.body_names[body] for body in bodies)
+            return f" (if they always touch, Scene.from_mjcf(exclude=[({a!r}, {b!r})]))"
+    return ""

@@ -9,9 +9,9 @@ from jaxplan.evaluation.motion_bench import (
     HOME,
     data_directory,
     obstacles_mjcf,
-    robot_mjcf,
     read_problems,
     read_robot,
+    robot_mjcf,
     sphere_cage,
     table,
 )

@@ -92,7 +92,8 @@ def _limits(scene: Scene, joint: str, low: float, high: float) -> str:
     kind = scene.joint_kind(joint)
     if np.isfinite(low) or np.isfinite(high):
         return f"{kind}, {low:.4f} to {with_unit(scene, joint, high)}"
-    return f"{kind}, no limits" + (", goes round" if kind == "hinge" else "")
+    round_ = scene.circular[scene.joints.index(joint)]
+    return f"{kind}, no limits" + (", goes round" if round_ else "")
 
 
 def _show_joints(scene: Scene, title: str, names: Sequence[str]) -> None:

@@ -33,6 +33,7 @@ def plan(
     hand: str | None = None,
     velocity: float = 1.0,
     acceleration: float = 2.0,
+    time_limit: float | None = None,
     config: PlannerConfig = PlannerConfig(),
 ) -> bool:
     """Plans, asks C MuJoCo about path and motion, and says what came of it.
@@ -48,6 +49,7 @@ def plan(
         hand: See `read_scene`.
         velocity: Of each joint at most [rad/s or m/s].
         acceleration: Of each joint at most [rad/s^2 or m/s^2].
+        time_limit: Of the search [s]; None = its budget of expansions alone.
         config: Of the planner.
 
     Returns:
@@ -77,7 +79,7 @@ def plan(
         f"{path}: {len(scene.joints)} joints, {len(scene.pairs)} pairs that can touch"
     )
     print(f"ready in {time.perf_counter() - began:.1f} s")
-    answer = planner.plan(first.q, last.q, seed, world)
+    answer = planner.plan(first.q, last.q, seed, world, time_limit)
     _show(scene, answer)
     timed, certificates = None, {}
     if answer.solved:
