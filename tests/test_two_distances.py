@@ -34,12 +34,17 @@ def answers() -> dict[str, np.ndarray]:
     """`[2, n]` our distance and C MuJoCo's, by the names of bodies."""
     rng = np.random.default_rng(0)
     stone = rng.normal(size=(12, 3)) * [0.08, 0.05, 0.01]
-    hinges = "".join(f'<joint axis="{a}"/>' for a in ("1 0 0", "0 1 0", "0 0 1"))
-    scene = Scene.from_mjcf(f"""<mujoco><compiler angle="radian"/><asset>
+    joints = [f"{kind}{k}" for kind in ("slide", "hinge") for k in range(3)]
+    axes = "1 0 0", "0 1 0", "0 0 1"
+    six = "".join(
+        f'<joint name="{name}" type="{name[:-1]}" axis="{axes[int(name[-1])]}"/>'
+        for name in joints
+    )
+    mjcf = f"""<mujoco><compiler angle="radian"/><asset>
       <mesh name="stone" vertex="{" ".join(map(str, stone.ravel()))}"/></asset>
       <worldbody>{bodies("world", (*KINDS, "plane"))}
-      <body>{hinges.replace("<joint", '<joint type="slide"')}{hinges}
-      {bodies("robot", KINDS)}</body></worldbody></mujoco>""")
+      <body>{six}{bodies("robot", KINDS)}</body></worldbody></mujoco>"""
+    scene = Scene.from_mjcf(mjcf, joints=joints, exclude=None)
     groups = [group.name for group in scene.groups]
     # Each pair of bodies on its own: all others are ignored.
     worlds = make_world(scene)._replace(
