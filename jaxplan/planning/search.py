@@ -66,7 +66,10 @@ def examine(query: Query, space: Space) -> tuple[Query, jax.Array]:
     """
     given = jnp.stack([*query[:3], *jnp.moveaxis(query.goals, 1, 0)])
     finite = jnp.all(jnp.isfinite(given), axis=(0, 2))
-    middle = np.nan_to_num(0.5 * (space.q_min + space.q_max), posinf=0, neginf=0)
+    low, high = (
+        np.nan_to_num(x, posinf=0, neginf=0) for x in (space.q_min, space.q_max)
+    )
+    middle = 0.5 * (low + high)
     given = jnp.where(finite[:, None], given, middle)
     q_start, q_goal, q_toggle = given[:3]
     goals = jnp.moveaxis(given[3:], 0, 1)
