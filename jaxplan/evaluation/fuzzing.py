@@ -20,8 +20,10 @@ from jaxplan.collision import (
 )
 from jaxplan.collision.course import Course
 from jaxplan.collision.oracle import Replica
+from jaxplan.collision.rows import clearance_rows
 from jaxplan.collision.touching import random_poses
 from jaxplan.config import PlannerConfig
+from jaxplan.evaluation.random_scenes import random_world
 from jaxplan.plan import Plan
 from jaxplan.planner import Planner
 from jaxplan.pose import Pose
@@ -79,30 +81,39 @@ class _Questioner:
             workers=int(rng.choice([1, 16])),
         )
         self.planner = Planner(scene, self.config)
+        # Each compiles programs of its own.
+        self.asks = {what: rng.random() < 0.25 for what in ("alone", "poses")}
         self.required = np.asarray(required_clearances(scene, self.config.margin))
 
     def faults(self, world: World, first: bool) -> Iterator[str]:
         """What is wrong with the answers in one world; `first`: the longer list is asked."""
         planner, rng = self.planner, self.rng
         q = random_poses(self.scene, 200, int(rng.integers(2**31)))
-        ours = planner.clearance(q, world)
+        ours = clearance_rows(self.scene, world, q)
         yield from self._verdicts(world, q, ours)
         room = q[ours > self.required.max(initial=0.0) + 1e-3]
         ends = np.resize(room if len(room) else q, (8, q.shape[1]))
-        plan = planner.plan(ends[0], ends[1], 0, world, time_limit=LIMIT)
-        yield from self._path(plan, ends[0], ends[1], "plan")
         batch = planner.plan_batch(ends[::2], ends[1::2], None, world, time_limit=LIMIT)
-        for row, one in enumerate(batch):
-            yield from self._path(one, ends[2 * row], ends[2 * row + 1], f"batch {row}")
-        late = "TIME_OUT" in (plan.status.name, batch[0].status.name)
-        if not late and not np.array_equal(plan.path, batch[0].path):
-            yield f"alone {plan.status.name}, in a batch {batch[0].status.name}: not the same"
-        if first:
+        for row, plan in enumerate(batch):
+            pair = ends[2 * row], ends[2 * row + 1]
+            yield from self._path(plan, *pair, f"question {row}")
+        if first and self.asks["alone"]:
+            yield from self._alone(batch[0], ends, q, ours)
+        if first and self.asks["poses"]:
             yield from self._poses(world, ends)
-        if first and rng.random() < 0.1:
-            copy = pickle.loads(pickle.dumps(planner))
-            if not np.array_equal(copy.clearance(q, world), ours):
-                yield "a copied planner measures something else"
+
+    def _alone(
+        self, other: Plan, ends: np.ndarray, q: np.ndarray, ours: np.ndarray
+    ) -> Iterator[str]:
+        """The first question of a batch on its own, of a copied planner; its distances."""
+        planner = pickle.loads(pickle.dumps(self.planner))
+        self.judged.counts["asked alone"] += 1
+        plan = planner.plan(ends[0], ends[1], 0, other.world, time_limit=LIMIT)
+        late = "TIME_OUT" in (plan.status.name, other.status.name)
+        if not late and not np.array_equal(plan.path, other.path):
+            yield f"alone {plan.status.name}, in a batch {other.status.name}: not the same"
+        if not np.allclose(planner.clearance(q, other.world), ours, atol=1e-6):
+            yield "the planner and the certificate measure other distances"
 
     def _verdicts(self, world: World, q: np.ndarray, ours: np.ndarray) -> Iterator[str]:
         """Our distances beside C MuJoCo's."""
@@ -134,7 +145,7 @@ class _Questioner:
         self, plan: Plan, start: np.ndarray, goal: np.ndarray | None, name: str
     ) -> Iterator[str]:
         """A plan, its certificates and the motion made of it."""
-        judged, scene = self.judged, self.scene
+        judged = self.judged
         judged.statuses[plan.status.name] += 1
         if not plan.solved:
             if not plan.reason:
@@ -238,7 +249,5 @@ class _Questioner:
 
 def worlds_of(scene: Scene, seed: int, count: int) -> list[World]:
     """The model's own world, and random ones."""
-    from jaxplan.evaluation.random_scenes import random_world
-
     rng = np.random.default_rng(seed)
     return [make_world(scene), *(random_world(scene, rng) for _ in range(count))]
