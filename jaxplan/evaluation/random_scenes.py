@@ -34,9 +34,9 @@ class Drawn(NamedTuple):
         return Scene.from_mjcf(*self)
 
 
-def random_scene(seed: int) -> Drawn:
-    """Draws a scene; the same for the same seed."""
-    return _Maker(seed).scene()
+def random_scene(seed: int, most: int = 14) -> Drawn:
+    """Draws a scene, the same for the same seed, of at most so many joints."""
+    return _Maker(seed).scene(most)
 
 
 def random_world(scene: Scene, rng: np.random.Generator) -> World:
@@ -71,10 +71,10 @@ class _Maker:
         self.bodies: list[str] = []
         self.meshes, self.ties = "", ""
 
-    def scene(self) -> Drawn:
+    def scene(self, most: int) -> Drawn:
         """All of it."""
         rng = self.rng
-        count = int(rng.integers(1, rng.choice([4, 8, 15])))
+        count = min(most, int(rng.integers(1, rng.choice([4, 8, 15]))))
         arms = 2 if count > 3 and rng.random() < 0.3 else 1
         shares = np.diff([0, *sorted(rng.integers(1, count, arms - 1)), count])
         world = "".join(
@@ -105,6 +105,7 @@ class _Maker:
         slots = {str(kind): int(rng.integers(1, 3)) for kind in kinds}
         mjcf = (
             '<mujoco><compiler angle="radian" boundmass="1" boundinertia="1"/>'
+            '<default><joint armature="1"/></default>'
             f"<asset>{self.meshes}</asset><worldbody>{world}</worldbody>"
             f"<contact>{contact}</contact><equality>{self.ties}</equality></mujoco>"
         )
