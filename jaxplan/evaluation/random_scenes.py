@@ -49,7 +49,11 @@ def random_world(scene: Scene, rng: np.random.Generator) -> World:
     held = np.array(holdable, bool) & (rng.random(objects) < 0.5)
     pose[held, :3] = rng.uniform(-0.1, 0.1, (held.sum(), 3))
     obstacles = [
-        Obstacle(slot.kind, _size(rng, slot.kind, 0.02, 0.15), [*_around(rng), *turn])
+        Obstacle(
+            slot.kind,
+            _size(rng, slot.kind, 0.02, 0.15).tolist(),
+            [*_around(rng), *turn],
+        )
         for slot, turn in zip(scene.slots, _turns(rng, len(scene.slots)), strict=True)
         if rng.random() < 0.7
     ]
