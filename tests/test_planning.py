@@ -192,6 +192,25 @@ def test_paths_are_checked_densely(method):
     assert np.sum(strict.status == Status.SOLVED) > 40
 
 
+@pytest.mark.parametrize("workers", [1, 4])
+def test_paths_lead_from_the_start_to_the_goal(workers):
+    """Whichever tree came to the other, and however small that was."""
+    worlds, q_start, q_goal, keys = problems(32, d=3, seed=13)
+    config = settings_of(
+        balance=True,
+        workers=workers,
+        step_min=0.4,
+        step_max=0.4,
+        max_expansions=2000,
+    )
+    result = planner(config, d=3)(worlds, q_start, q_goal, q_goal, keys)
+    solved = result.status == Status.SOLVED
+    assert solved.sum() > 24
+    start, goal = np.moveaxis(np.asarray(result.path)[solved][:, [0, -1]], 1, 0)
+    np.testing.assert_array_equal(start, q_start[solved])
+    np.testing.assert_array_equal(goal, q_goal[solved])
+
+
 def test_ao_rrt_connect_tends_to_the_shortest_path():
     """Around one ball the shortest path is known: two tangents and an arc."""
     count, radius, reach = 16, 0.5, 1.0

@@ -100,7 +100,8 @@ def advance(
     else:
         side = jnp.where(was, control.side, side)
     return Control(
-        side=jnp.where(onward | met | following, control.side, side),
+        # `ends` reads from the side in which tree the newest node is.
+        side=jnp.where(onward | following | met, control.side, side),
         connecting=following | grown | onward,
         following=following,
         chained=following | onward,
