@@ -10,7 +10,7 @@ no pair waits for another in a distant part of the batch.
 """
 
 from collections.abc import Callable, Sequence
-from functools import partial, reduce
+from functools import partial
 from typing import NamedTuple
 
 import jax
@@ -28,7 +28,6 @@ from jaxplan.collision.shapes import (
     minus,
     once,
     plus,
-    smaller,
     times,
     where,
 )
@@ -66,10 +65,7 @@ def least_convex(
         (`_depth`).
     """
     cores = stacked([cores_of(kind, shapes) for kind, shapes in parts])
-    kinds = np.repeat([kind for kind, _ in parts], [len(s.size[0]) for _, s in parts])
-    mesh = kinds == "mesh"
-    flip = mesh[pairs[:, 1]] & ~mesh[pairs[:, 0]]
-    a, b = np.where(flip[:, None], pairs[:, ::-1], pairs).T
+    a, b = pairs.T
     radius = cores.radius[a] + cores.radius[b]
     least, most = _balls(cores, a, b)
     if score.exact:
@@ -78,24 +74,15 @@ def least_convex(
     else:
         reach = score.margin
     near = (least - radius <= reach) & counts
-    rated = []
-    for one, other in ((False, False), (True, False), (True, True)):
-        (rows,) = np.nonzero((mesh[a] == one) & (mesh[b] == other))
-        if not len(rows):
-            continue
-        simple = set(kinds[[*a[rows], *b[rows]]]) <= {"sphere", "capsule", "box"}
-        own = score._replace(margin=_of_pairs(score.margin, rows))
-        tiles = partial(_in_tiles, cores, a[rows], b[rows], (one, other), own.margin)
-        thick = radius[rows]
-        gap = tiles(_box_gap, near[rows], jnp.inf) - thick
-        close = near[rows] & (gap <= _of_pairs(reach, rows))
-        found = tiles(partial(_squared, score.exact), close, jnp.inf)
-        scores = own.of_squared(found, thick)
-        if score.exact:
-            depth = partial(_depth, 0 if simple else ROUNDS)
-            scores -= tiles(depth, found == 0, 0.0)
-        rated.append(jnp.min(scores, 0))
-    return reduce(smaller, rated)
+    tiles = partial(_in_tiles, cores, a, b, score.margin)
+    close = near & (tiles(_box_gap, near, jnp.inf) - radius <= reach)
+    found = tiles(partial(_squared, score.exact), close, jnp.inf)
+    scores = score.of_squared(found, radius)
+    if score.exact:
+        simple = {kind for kind, _ in parts} <= {"sphere", "capsule", "box"}
+        depth = partial(_depth, 0 if simple else ROUNDS)
+        scores -= tiles(depth, found == 0, 0.0)
+    return jnp.min(scores, 0)
 
 
 def _balls(cores: Cores, a: np.ndarray, b: np.ndarray) -> tuple[jax.Array, jax.Array]:
@@ -107,11 +94,6 @@ def _balls(cores: Cores, a: np.ndarray, b: np.ndarray) -> tuple[jax.Array, jax.A
     # Balls that meet say nothing of depth.
     least = jnp.where(least > 0, least, -jnp.inf)
     return least, distance - (cores.inner[a] + cores.inner[b])
-
-
-def _of_pairs(margin: jax.Array | float, rows: np.ndarray) -> jax.Array | float:
-    """The rows of what may be a number for each pair, `[P, B]`."""
-    return margin[rows] if isinstance(margin, jax.Array) and margin.ndim > 1 else margin
 
 
 class Pair(NamedTuple):
@@ -140,7 +122,6 @@ def _in_tiles(
     cores: Cores,
     a: np.ndarray,
     b: np.ndarray,
-    meshes: tuple[bool, bool],
     margin: jax.Array | float,
     function: Callable[[Pair], jax.Array],
     chosen: jax.Array,
@@ -153,13 +134,13 @@ def _in_tiles(
     (order,) = jnp.nonzero(chosen.reshape(-1), size=slots, fill_value=size)
     count = jnp.sum(chosen)
 
-    def pick(rows: jax.Array, columns: jax.Array, mesh: bool) -> Cores:
+    def pick(rows: jax.Array, columns: jax.Array) -> Cores:
         def one(leaf: jax.Array) -> jax.Array:
             return leaf[rows, columns if leaf.shape[-1] > 1 else 0]
 
-        picked = jax.tree.map(one, cores._replace(vertices=()))
-        vertices = (x[:, rows, 0] for x in cores.vertices if mesh)
-        return picked._replace(vertices=tuple(vertices))
+        picked = jax.tree.map(one, cores._replace(hulls=None))
+        own = cores.hulls and cores.hulls._replace(row=cores.hulls.row[rows, 0])
+        return picked._replace(hulls=own)
 
     def own_margin(rows: jax.Array, columns: jax.Array) -> jax.Array | float:
         if not isinstance(margin, jax.Array) or margin.ndim == 0:
@@ -170,8 +151,8 @@ def _in_tiles(
         done, values = state
         places = jax.lax.dynamic_slice(order, (done,), (tile,))
         row, column = jnp.unravel_index(places, chosen.shape)
-        one = pick(jnp.asarray(a)[row], column, meshes[0])
-        other = pick(jnp.asarray(b)[row], column, meshes[1])
+        one = pick(jnp.asarray(a)[row], column)
+        other = pick(jnp.asarray(b)[row], column)
         offset = [dot(axis, minus(one.centre, other.centre)) for axis in other.axes]
         axes = [[dot(axis, own) for axis in other.axes] for own in one.axes]
         offset, axes = once((offset, axes))
