@@ -28,6 +28,7 @@ from jaxplan.collision.shapes import (
     minus,
     once,
     plus,
+    smaller,
     times,
     where,
 )
@@ -36,7 +37,7 @@ from jaxplan.collision.solids import TINY, Cores, cores_of, farthest, stacked
 Best = tuple[jax.Array, Vector]
 """A signed distance found [m], and the direction."""
 
-TILE = 256
+TILE = 64
 """Pairs that are searched together: few enough for the cache."""
 ROUNDS = 2
 """Searches for a shorter way out of something round or a mesh, see `_depth`."""
@@ -75,14 +76,27 @@ def least_convex(
         reach = score.margin
     near = (least - radius <= reach) & counts
     tiles = partial(_in_tiles, cores, a, b, score.margin)
-    close = near & (tiles(_box_gap, near, jnp.inf) - radius <= reach)
-    found = tiles(partial(_squared, score.exact), close, jnp.inf)
-    scores = score.of_squared(found, radius)
-    if score.exact:
-        simple = {kind for kind, _ in parts} <= {"sphere", "capsule", "box"}
-        depth = partial(_depth, 0 if simple else ROUNDS)
-        scores -= tiles(depth, found == 0, 0.0)
-    return jnp.min(scores, 0)
+    lower = tiles(_box_gap, near, jnp.inf) - radius
+    if not score.exact:
+        found = tiles(partial(_squared, False), near & (lower <= reach), jnp.inf)
+        return jnp.min(score.of_squared(found, radius), 0)
+    lower -= score.margin
+    simple = {kind for kind, _ in parts} <= {"sphere", "capsule", "box"}
+    depth = partial(_depth, 0 if simple else ROUNDS)
+
+    def search(least: jax.Array, limit: jax.Array) -> jax.Array:
+        chosen = near & (lower <= limit)
+        found = tiles(partial(_squared, True), chosen, jnp.inf)
+        scores = score.of_squared(found, radius)
+        scores -= tiles(depth, chosen & (found == 0), 0.0)
+        return smaller(jnp.min(scores, 0), least)
+
+    # First what can be the nearest, then all that may be nearer than it is.
+    first = jnp.min(jnp.where(near, lower, jnp.inf), 0)
+    nothing = jnp.full_like(first, jnp.inf)
+    return jax.lax.fori_loop(
+        0, 2, lambda k, least: search(least, jnp.where(k == 0, first, least)), nothing
+    )
 
 
 def _balls(cores: Cores, a: np.ndarray, b: np.ndarray) -> tuple[jax.Array, jax.Array]:
@@ -166,15 +180,24 @@ def _in_tiles(
 
 
 def _box_gap(pair: Pair) -> jax.Array:
-    """The cores are at least so far apart, `[tile]` [m]: as the boxes around them."""
-    beyond = []
+    """The signed distance of the cores is at least that, `[tile]` [m]: of boxes around them."""
+    back = [list(column) for column in zip(*pair.axes, strict=True)]
+    own = [dot(axis, pair.offset) for axis in pair.axes]
+    a, b = pair.a.bounds, pair.b.bounds
+    return larger(_over(pair.offset, b, a, pair.axes), _over(own, a, b, back))
+
+
+def _over(offset: Vector, own: Vector, other: Vector, axes: list[Vector]) -> jax.Array:
+    """How far another box is from one, along the one's axes; its own axes are in that frame."""
+    over = []
     for k in range(3):
-        extent = pair.b.bounds[k]
-        for half, axis in zip(pair.a.bounds, pair.axes, strict=True):
+        extent = own[k]
+        for half, axis in zip(other, axes, strict=True):
             extent = extent + jnp.abs(axis[k]) * half
-        beyond.append(larger(jnp.abs(pair.offset[k]) - extent, 0.0))
-    gap = jnp.sqrt(dot(beyond, beyond))
-    return jnp.where(gap > 0, gap, -jnp.inf)  # boxes that meet say nothing of depth
+        over.append(jnp.abs(offset[k]) - extent)
+    most = larger(larger(over[0], over[1]), over[2])
+    beyond = [larger(x, 0.0) for x in over]
+    return jnp.where(most > 0, jnp.sqrt(dot(beyond, beyond)), most)
 
 
 def _squared(exact: bool, pair: Pair) -> jax.Array:
@@ -195,6 +218,7 @@ def _depth(rounds: int, pair: Pair) -> jax.Array:
     own = [[one * (i == k) for i in range(3)] for k in range(3)]
     edges = [cross(x, y) for x in own for y in pair.axes]
     ways = jnp.array([_unit(way) for way in (pair.offset, *own, *pair.axes, *edges)])
+    ways = jnp.concatenate([ways, -ways])
 
     def attempt(best: Best, way: Vector) -> Best:
         gap = dot(way, pair.support(way))
@@ -202,8 +226,8 @@ def _depth(rounds: int, pair: Pair) -> jax.Array:
         better = (gap > best[0]) & (dot(way, way) > 0.5)
         return jnp.where(better, gap, best[0]), where(better, way, best[1])
 
-    def both(best: Best, way: jax.Array) -> tuple[Best, None]:
-        return attempt(attempt(best, list(way)), list(-way)), None
+    def each(best: Best, way: jax.Array) -> tuple[Best, None]:
+        return attempt(best, list(way)), None
 
     def refine(_: int, best: Best) -> Best:
         shift = times(1e-4 - best[0], best[1])
@@ -214,7 +238,7 @@ def _depth(rounds: int, pair: Pair) -> jax.Array:
         nearest, _squared = nearest_point(support, plus(pair.offset, shift))
         return attempt(best, _unit(nearest))
 
-    best, _ = jax.lax.scan(both, (one - jnp.inf, own[0]), ways)
+    best, _ = jax.lax.scan(each, (one - jnp.inf, own[0]), ways)
     return -(jax.lax.fori_loop(0, rounds, refine, best) if rounds else best)[0]
 
 

@@ -6,6 +6,7 @@ looked at. A vertex is left out where another one lies farther in all four corne
 cell, hence everywhere in it; so the answer is that of a look at all.
 """
 
+from collections.abc import Sequence
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -85,21 +86,36 @@ def read_hulls(model: mujoco.MjModel, ids: tuple[int, ...]) -> Hulls:
     )
 
 
-def with_points(hulls: Hulls, before: int, after: int) -> Hulls:
-    """So many more geoms before and after, each a point: they have a hull of one vertex."""
-    last = len(hulls.first) // CELLS
-
-    def filled(leaf: jax.Array, value: int) -> jax.Array:
-        fill = [(0, 0)] * (leaf.ndim - 2) + [(before, after), (0, 0)]
-        return jnp.pad(leaf, fill, constant_values=value)
-
-    more = hulls.first[-1] + 1 + jnp.arange(CELLS, dtype=jnp.int32)
+def joined(parts: Sequence[tuple[Hulls | None, int]]) -> Hulls | None:
+    """Those of several parts of so many geoms each; what is no mesh gets a point's."""
+    if not any(hulls for hulls, _ in parts):
+        return None
+    point = jnp.arange(CELLS + 1, dtype=jnp.int32)
+    nothing = jnp.zeros((3, CELLS), jnp.float32)
+    first, vertices = [], []
+    rows, bounds, radius = [], [], []
+    for hulls, count in parts:
+        if hulls is None:
+            zero = jnp.zeros((count, 1), jnp.float32)
+            hulls = Hulls(
+                zero.astype(jnp.int32),
+                zero[None] * jnp.ones((3, 1, 1)),
+                zero,
+                point,
+                nothing,
+            )
+        rows.append(hulls.row + sum(map(len, first)) // CELLS)
+        first.append(hulls.first[:-1] + sum(x.shape[1] for x in vertices))
+        vertices.append(hulls.vertices)
+        bounds.append(hulls.bounds)
+        radius.append(hulls.radius)
+    end = jnp.array([sum(x.shape[1] for x in vertices)], jnp.int32)
     return Hulls(
-        row=filled(hulls.row, last),
-        bounds=filled(hulls.bounds, 0),
-        radius=filled(hulls.radius, 0),
-        first=jnp.concatenate([hulls.first, more]),
-        vertices=jnp.pad(hulls.vertices, [(0, 0), (0, CELLS)]),
+        row=jnp.concatenate(rows),
+        bounds=jnp.concatenate(bounds, 1),
+        radius=jnp.concatenate(radius),
+        first=jnp.concatenate([*first, end]),
+        vertices=jnp.concatenate(vertices, 1),
     )
 
 

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import jax
 import jax.numpy as jnp
 
-from jaxplan.collision.hulls import TINY, Hulls, with_points
+from jaxplan.collision.hulls import TINY, Hulls, joined
 from jaxplan.collision.shapes import (
     Shapes,
     Vector,
@@ -74,17 +74,13 @@ def cores_of(kind: str, shapes: Shapes) -> Cores:
 
 def stacked(parts: Sequence[Cores]) -> Cores:
     """All geoms as rows, one part after the other."""
-    sizes = [len(part.disc) for part in parts]
-    hulls = None
-    for k, part in enumerate(parts):
-        if part.hulls:  # meshes are one part
-            hulls = with_points(part.hulls, sum(sizes[:k]), sum(sizes[k + 1 :]))
 
     def join(*leaves: jax.Array) -> jax.Array:
         last = max(leaf.shape[-1] for leaf in leaves)
         wide = [jnp.broadcast_to(x, (*x.shape[:-1], last)) for x in leaves]
         return jnp.concatenate(wide, axis=-2)
 
+    hulls = joined([(part.hulls, len(part.disc)) for part in parts])
     bare = [part._replace(hulls=None) for part in parts]
     return jax.tree.map(join, *bare)._replace(hulls=hulls)
 
