@@ -13,13 +13,14 @@ import pytest
 
 from jaxplan.collision import XLA_OPTIONS
 from jaxplan.collision.convex import least_convex
+from jaxplan.collision.hulls import read_hulls
 from jaxplan.collision.narrow import CLOSED, SOLID
 from jaxplan.collision.shapes import Score, Shapes, in_world, read
 
 BAND = 1e-4
 MARGIN = 0.01
 ROWS = 128
-HULL = 56
+VERTICES = 10_000
 # Half the time to compile, and the same sums.
 QUICK = {**XLA_OPTIONS, "xla_backend_optimization_level": 0}
 PAIRS = [
@@ -90,9 +91,10 @@ def shapes(model: mujoco.MjModel, name: str, poses: np.ndarray) -> Shapes:
     """
     scene: Any = SimpleNamespace(model=model, mj_model=model)
     own = read(scene, (model.geom(name).id,))
-    fill = [(0, HULL - len(own.vertices[0]) if own.vertices else 0), (0, 0), (0, 0)]
-    padded = (jnp.pad(x, fill, mode="edge") for x in own.vertices)
-    own = own._replace(vertices=tuple(padded))
+    if own.hulls:
+        fill = [(0, 0), (0, VERTICES - own.hulls.vertices.shape[1])]
+        padded = jnp.pad(own.hulls.vertices, fill, mode="edge")
+        own = own._replace(hulls=own.hulls._replace(vertices=padded))
     batch_last = jnp.asarray(np.moveaxis(poses, 0, -1)[None], jnp.float32)
     return in_world(own, batch_last, np.zeros(1, int))
 
@@ -167,3 +169,25 @@ def test_every_pair_of_kinds_agrees_with_mujoco(kinds: tuple[str, str]):
     if "plane" in kinds or set(kinds) <= {"sphere", "capsule", "box"}:
         assert over.max(initial=0) < 1e-5
     assert np.quantile(np.append(over, 0.0), 0.9) < 5e-3
+
+
+def test_of_a_hull_the_farthest_vertex_is_found():
+    spec = mujoco.MjSpec()
+    rng, turn = np.random.default_rng(0), np.linspace(0, 2 * np.pi, 90, endpoint=False)
+    ring = np.stack([np.cos(turn), np.sin(turn), 0 * turn], 1)
+    rods = np.concatenate(
+        [ring, ring + np.array([0, 0, 3])]
+    )  # many vertices around two poles
+    for k, points in enumerate([CUBE, rods, rng.normal(size=(300, 3))]):
+        spec.add_mesh(name=f"{k}", uservert=0.1 * points.ravel())
+        for _ in range(2):
+            spec.worldbody.add_geom(type=geom_type("mesh"), meshname=f"{k}")
+    model = spec.compile()
+    along = rng.normal(size=(3, model.ngeom, 500)).astype(np.float32)
+    along[..., :250] = np.round(along[..., :250])  # borders of cells among them
+    found = np.array(read_hulls(model, (*range(model.ngeom),)).farthest([*along]))
+    for geom, mesh in enumerate(model.geom_dataid):
+        start, count = model.mesh_vertadr[mesh], model.mesh_vertnum[mesh]
+        heights = model.mesh_vert[start : start + count] @ along[:, geom]
+        own = (found[:, geom] * along[:, geom]).sum(0)
+        np.testing.assert_allclose(own, heights.max(0), atol=1e-6)

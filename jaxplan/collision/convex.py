@@ -10,7 +10,7 @@ no pair waits for another in a distant part of the batch.
 """
 
 from collections.abc import Callable, Sequence
-from functools import partial, reduce
+from functools import partial
 from typing import NamedTuple
 
 import jax
@@ -37,7 +37,7 @@ from jaxplan.collision.solids import TINY, Cores, cores_of, farthest, stacked
 Best = tuple[jax.Array, Vector]
 """A signed distance found [m], and the direction."""
 
-TILE = 256
+TILE = 64
 """Pairs that are searched together: few enough for the cache."""
 ROUNDS = 2
 """Searches for a shorter way out of something round or a mesh, see `_depth`."""
@@ -66,10 +66,7 @@ def least_convex(
         (`_depth`).
     """
     cores = stacked([cores_of(kind, shapes) for kind, shapes in parts])
-    kinds = np.repeat([kind for kind, _ in parts], [len(s.size[0]) for _, s in parts])
-    mesh = kinds == "mesh"
-    flip = mesh[pairs[:, 1]] & ~mesh[pairs[:, 0]]
-    a, b = np.where(flip[:, None], pairs[:, ::-1], pairs).T
+    a, b = pairs.T
     radius = cores.radius[a] + cores.radius[b]
     least, most = _balls(cores, a, b)
     if score.exact:
@@ -78,24 +75,28 @@ def least_convex(
     else:
         reach = score.margin
     near = (least - radius <= reach) & counts
-    rated = []
-    for one, other in ((False, False), (True, False), (True, True)):
-        (rows,) = np.nonzero((mesh[a] == one) & (mesh[b] == other))
-        if not len(rows):
-            continue
-        simple = set(kinds[[*a[rows], *b[rows]]]) <= {"sphere", "capsule", "box"}
-        own = score._replace(margin=_of_pairs(score.margin, rows))
-        tiles = partial(_in_tiles, cores, a[rows], b[rows], (one, other), own.margin)
-        thick = radius[rows]
-        gap = tiles(_box_gap, near[rows], jnp.inf) - thick
-        close = near[rows] & (gap <= _of_pairs(reach, rows))
-        found = tiles(partial(_squared, score.exact), close, jnp.inf)
-        scores = own.of_squared(found, thick)
-        if score.exact:
-            depth = partial(_depth, 0 if simple else ROUNDS)
-            scores -= tiles(depth, found == 0, 0.0)
-        rated.append(jnp.min(scores, 0))
-    return reduce(smaller, rated)
+    tiles = partial(_in_tiles, cores, a, b, score.margin)
+    lower = tiles(_box_gap, near, jnp.inf) - radius
+    if not score.exact:
+        found = tiles(partial(_squared, False), near & (lower <= reach), jnp.inf)
+        return jnp.min(score.of_squared(found, radius), 0)
+    lower -= score.margin
+    simple = {kind for kind, _ in parts} <= {"sphere", "capsule", "box"}
+    depth = partial(_depth, 0 if simple else ROUNDS)
+
+    def search(least: jax.Array, limit: jax.Array) -> jax.Array:
+        chosen = near & (lower <= limit)
+        found = tiles(partial(_squared, True), chosen, jnp.inf)
+        scores = score.of_squared(found, radius)
+        scores -= tiles(depth, chosen & (found == 0), 0.0)
+        return smaller(jnp.min(scores, 0), least)
+
+    # First what can be the nearest, then all that may be nearer than it is.
+    first = jnp.min(jnp.where(near, lower, jnp.inf), 0)
+    nothing = jnp.full_like(first, jnp.inf)
+    return jax.lax.fori_loop(
+        0, 2, lambda k, least: search(least, jnp.where(k == 0, first, least)), nothing
+    )
 
 
 def _balls(cores: Cores, a: np.ndarray, b: np.ndarray) -> tuple[jax.Array, jax.Array]:
@@ -107,11 +108,6 @@ def _balls(cores: Cores, a: np.ndarray, b: np.ndarray) -> tuple[jax.Array, jax.A
     # Balls that meet say nothing of depth.
     least = jnp.where(least > 0, least, -jnp.inf)
     return least, distance - (cores.inner[a] + cores.inner[b])
-
-
-def _of_pairs(margin: jax.Array | float, rows: np.ndarray) -> jax.Array | float:
-    """The rows of what may be a number for each pair, `[P, B]`."""
-    return margin[rows] if isinstance(margin, jax.Array) and margin.ndim > 1 else margin
 
 
 class Pair(NamedTuple):
@@ -140,7 +136,6 @@ def _in_tiles(
     cores: Cores,
     a: np.ndarray,
     b: np.ndarray,
-    meshes: tuple[bool, bool],
     margin: jax.Array | float,
     function: Callable[[Pair], jax.Array],
     chosen: jax.Array,
@@ -153,13 +148,13 @@ def _in_tiles(
     (order,) = jnp.nonzero(chosen.reshape(-1), size=slots, fill_value=size)
     count = jnp.sum(chosen)
 
-    def pick(rows: jax.Array, columns: jax.Array, mesh: bool) -> Cores:
+    def pick(rows: jax.Array, columns: jax.Array) -> Cores:
         def one(leaf: jax.Array) -> jax.Array:
             return leaf[rows, columns if leaf.shape[-1] > 1 else 0]
 
-        picked = jax.tree.map(one, cores._replace(vertices=()))
-        vertices = (x[:, rows, 0] for x in cores.vertices if mesh)
-        return picked._replace(vertices=tuple(vertices))
+        picked = jax.tree.map(one, cores._replace(hulls=None))
+        own = cores.hulls and cores.hulls._replace(row=cores.hulls.row[rows, 0])
+        return picked._replace(hulls=own)
 
     def own_margin(rows: jax.Array, columns: jax.Array) -> jax.Array | float:
         if not isinstance(margin, jax.Array) or margin.ndim == 0:
@@ -170,8 +165,8 @@ def _in_tiles(
         done, values = state
         places = jax.lax.dynamic_slice(order, (done,), (tile,))
         row, column = jnp.unravel_index(places, chosen.shape)
-        one = pick(jnp.asarray(a)[row], column, meshes[0])
-        other = pick(jnp.asarray(b)[row], column, meshes[1])
+        one = pick(jnp.asarray(a)[row], column)
+        other = pick(jnp.asarray(b)[row], column)
         offset = [dot(axis, minus(one.centre, other.centre)) for axis in other.axes]
         axes = [[dot(axis, own) for axis in other.axes] for own in one.axes]
         offset, axes = once((offset, axes))
@@ -185,15 +180,24 @@ def _in_tiles(
 
 
 def _box_gap(pair: Pair) -> jax.Array:
-    """The cores are at least so far apart, `[tile]` [m]: as the boxes around them."""
-    beyond = []
+    """The signed distance of the cores is at least that, `[tile]` [m]: of boxes around them."""
+    back = [list(column) for column in zip(*pair.axes, strict=True)]
+    own = [dot(axis, pair.offset) for axis in pair.axes]
+    a, b = pair.a.bounds, pair.b.bounds
+    return larger(_over(pair.offset, b, a, pair.axes), _over(own, a, b, back))
+
+
+def _over(offset: Vector, own: Vector, other: Vector, axes: list[Vector]) -> jax.Array:
+    """How far another box is from one, along the one's axes; its own axes are in that frame."""
+    over = []
     for k in range(3):
-        extent = pair.b.bounds[k]
-        for half, axis in zip(pair.a.bounds, pair.axes, strict=True):
+        extent = own[k]
+        for half, axis in zip(other, axes, strict=True):
             extent = extent + jnp.abs(axis[k]) * half
-        beyond.append(larger(jnp.abs(pair.offset[k]) - extent, 0.0))
-    gap = jnp.sqrt(dot(beyond, beyond))
-    return jnp.where(gap > 0, gap, -jnp.inf)  # boxes that meet say nothing of depth
+        over.append(jnp.abs(offset[k]) - extent)
+    most = larger(larger(over[0], over[1]), over[2])
+    beyond = [larger(x, 0.0) for x in over]
+    return jnp.where(most > 0, jnp.sqrt(dot(beyond, beyond)), most)
 
 
 def _squared(exact: bool, pair: Pair) -> jax.Array:
@@ -214,6 +218,7 @@ def _depth(rounds: int, pair: Pair) -> jax.Array:
     own = [[one * (i == k) for i in range(3)] for k in range(3)]
     edges = [cross(x, y) for x in own for y in pair.axes]
     ways = jnp.array([_unit(way) for way in (pair.offset, *own, *pair.axes, *edges)])
+    ways = jnp.concatenate([ways, -ways])
 
     def attempt(best: Best, way: Vector) -> Best:
         gap = dot(way, pair.support(way))
@@ -221,8 +226,8 @@ def _depth(rounds: int, pair: Pair) -> jax.Array:
         better = (gap > best[0]) & (dot(way, way) > 0.5)
         return jnp.where(better, gap, best[0]), where(better, way, best[1])
 
-    def both(best: Best, way: jax.Array) -> tuple[Best, None]:
-        return attempt(attempt(best, list(way)), list(-way)), None
+    def each(best: Best, way: jax.Array) -> tuple[Best, None]:
+        return attempt(best, list(way)), None
 
     def refine(_: int, best: Best) -> Best:
         shift = times(1e-4 - best[0], best[1])
@@ -233,7 +238,7 @@ def _depth(rounds: int, pair: Pair) -> jax.Array:
         nearest, _squared = nearest_point(support, plus(pair.offset, shift))
         return attempt(best, _unit(nearest))
 
-    best, _ = jax.lax.scan(both, (one - jnp.inf, own[0]), ways)
+    best, _ = jax.lax.scan(each, (one - jnp.inf, own[0]), ways)
     return -(jax.lax.fori_loop(0, rounds, refine, best) if rounds else best)[0]
 
 

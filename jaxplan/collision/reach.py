@@ -185,8 +185,8 @@ def core_radius(kind: str, shapes: Shapes) -> jax.Array:
     What is round around the core, the radius of a sphere or a capsule, goes with it.
     """
     size, corner = shapes.size, norm(shapes.size)
-    if kind == "mesh":
-        return jnp.max(norm(list(shapes.vertices)), 0)
+    if shapes.hulls:
+        return shapes.hulls.radius
     return {
         "sphere": jnp.zeros_like(corner),
         "capsule": size[1],

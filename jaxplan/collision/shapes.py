@@ -13,6 +13,7 @@ import jax.numpy as jnp
 import mujoco
 import numpy as np
 
+from jaxplan.collision.hulls import Hulls, read_hulls
 from jaxplan.collision.kinematics import rotation_of
 from jaxplan.scene import Scene
 
@@ -65,19 +66,20 @@ class Shapes(NamedTuple):
     """The geoms' x, y and z in that frame."""
     size: Vector
     """MuJoCo's sizes, each `[n, B]` or `[n, 1]` [m]."""
-    vertices: tuple[jax.Array, ...] = ()
-    """Of meshes: their hulls in the geoms' own frames, each `[V, n, 1]` [m]."""
+    hulls: Hulls | None = None
+    """Of meshes."""
 
 
 def read(scene: Scene, ids: tuple[int, ...]) -> Shapes:
     """Geoms in the frames of their bodies."""
     model, rows = scene.model, np.array(ids)
     rotation = rotation_of(model.geom_quat[rows].T)[..., None]
+    mesh = scene.mj_model.geom_type[ids[0]] == mujoco.mjtGeom.mjGEOM_MESH
     return Shapes(
         list(model.geom_pos[rows].T[..., None]),
         [list(rotation[:, k]) for k in range(3)],
         list(model.geom_size[rows].T[..., None]),
-        _vertices(scene.mj_model, ids),
+        read_hulls(scene.mj_model, ids) if mesh else None,
     )
 
 
@@ -174,29 +176,3 @@ def once(values: Values) -> Values:
     always = jax.lax.bitcast_convert_type(first, jnp.int32) != 0x7FC0BEEF
     zeros = partial(jax.tree.map, jnp.zeros_like, values)
     return jax.lax.cond(always, lambda: values, zeros)
-
-
-def _vertices(model: mujoco.MjModel, ids: tuple[int, ...]) -> tuple[jax.Array, ...]:
-    """Hulls of meshes, filled up to one length with their own first vertex."""
-    meshes = [int(model.geom_dataid[g]) for g in ids]
-    if model.geom_type[ids[0]] != mujoco.mjtGeom.mjGEOM_MESH:
-        return ()
-    hulls = [_hull(model, mesh) for mesh in meshes]
-    longest = max(map(len, hulls))
-    rows = [np.concatenate([h, h[:1].repeat(longest - len(h), 0)]) for h in hulls]
-    return tuple(jnp.asarray(np.transpose(rows)[..., None], jnp.float32))
-
-
-def _hull(model: mujoco.MjModel, mesh: int) -> np.ndarray:
-    """`[V, 3]` vertices of a mesh's convex hull; all of its vertices if MuJoCo made none.
-
-    The graph is: numbers of vertices and of faces, an edge address per vertex, then each
-    vertex' place in the mesh.
-    """
-    start, count = model.mesh_vertadr[mesh], model.mesh_vertnum[mesh]
-    vertices = model.mesh_vert[start : start + count]
-    graph = model.mesh_graphadr[mesh]
-    if graph < 0:
-        return vertices
-    count = model.mesh_graph[graph]
-    return vertices[model.mesh_graph[graph + 2 + count : graph + 2 + 2 * count]]

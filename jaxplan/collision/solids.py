@@ -2,7 +2,7 @@
 
 A core is the Minkowski sum of a box, a disc, an ellipsoid and the hull of some vertices,
 all but one or two of them mere points: a capsule is a segment with a radius, a cylinder a
-segment and a disc. So one compiled search serves every kind, and a mesh costs one more.
+segment and a disc. So one compiled search serves every kind.
 """
 
 from collections.abc import Sequence
@@ -11,20 +11,15 @@ from typing import NamedTuple
 import jax
 import jax.numpy as jnp
 
+from jaxplan.collision.hulls import TINY, Hulls, joined
 from jaxplan.collision.shapes import (
     Shapes,
     Vector,
     dot,
     larger,
-    once,
     plus,
     smaller,
-    where,
 )
-
-TINY = 1e-30
-CHUNK = 8
-"""Vertices of a mesh that are looked at together."""
 
 
 class Cores(NamedTuple):
@@ -44,8 +39,8 @@ class Cores(NamedTuple):
     """Radius of a ball in the core, around the geom's centre [m]."""
     radius: jax.Array
     """Of what is around the core: that of spheres and capsules [m]."""
-    vertices: tuple[jax.Array, ...] = ()
-    """In the geoms' own frames, each `[V, n, 1]` [m]; none: no mesh among them."""
+    hulls: Hulls | None = None
+    """None: no mesh among them."""
 
 
 def cores_of(kind: str, shapes: Shapes) -> Cores:
@@ -59,7 +54,7 @@ def cores_of(kind: str, shapes: Shapes) -> Cores:
         box.get(kind, nothing),
         [disc, disc, zero],
         size if kind == "ellipsoid" else nothing,
-        [jnp.max(jnp.abs(x), 0) for x in shapes.vertices] or nothing,
+        [*shapes.hulls.bounds] if shapes.hulls else nothing,
     )
     bounds = [jnp.broadcast_to(sum(x), zero.shape) for x in zip(*parts, strict=True)]
     least = smaller(smaller(bounds[0], bounds[1]), bounds[2])
@@ -73,28 +68,21 @@ def cores_of(kind: str, shapes: Shapes) -> Cores:
         # Of a mesh no more is known than that its centre of mass is in it.
         inner=zero if kind == "mesh" else least,
         radius=size[0] if kind in ("sphere", "capsule") else zero,
-        vertices=shapes.vertices,
+        hulls=shapes.hulls,
     )
 
 
 def stacked(parts: Sequence[Cores]) -> Cores:
     """All geoms as rows, one part after the other."""
-    longest = max((len(x) for part in parts for x in part.vertices), default=0)
-
-    def filled(part: Cores) -> Cores:
-        if not longest:
-            return part
-        own = part.vertices or (jnp.zeros((1, len(part.disc), 1), jnp.float32),) * 3
-        fill = [(0, longest - len(own[0])), (0, 0), (0, 0)]
-        padded = (jnp.pad(x, fill, mode="edge") for x in own)
-        return part._replace(vertices=tuple(padded))
 
     def join(*leaves: jax.Array) -> jax.Array:
         last = max(leaf.shape[-1] for leaf in leaves)
         wide = [jnp.broadcast_to(x, (*x.shape[:-1], last)) for x in leaves]
         return jnp.concatenate(wide, axis=-2)
 
-    return jax.tree.map(join, *map(filled, parts))
+    hulls = joined([(part.hulls, len(part.disc)) for part in parts])
+    bare = [part._replace(hulls=None) for part in parts]
+    return jax.tree.map(join, *bare)._replace(hulls=hulls)
 
 
 def farthest(cores: Cores, along: Vector) -> Vector:
@@ -113,28 +101,4 @@ def farthest(cores: Cores, along: Vector) -> Vector:
         for half, x, s, y in zip(cores.box, along, cores.ball, scaled, strict=True)
     ]
     point = [point[0] + disc * along[0], point[1] + disc * along[1], point[2]]
-    if cores.vertices:
-        point = plus(point, _farthest_vertex(cores.vertices, along))
-    return point
-
-
-def _farthest_vertex(vertices: Sequence[jax.Array], along: Vector) -> Vector:
-    """By a loop over chunks: a hull of hundreds compiles as fast as one of eight."""
-    missing = -len(vertices[0]) % CHUNK
-    filled = [jnp.concatenate([x, jnp.repeat(x[:1], missing, 0)]) for x in vertices]
-    table = jnp.stack(filled, 1)
-    chunks = table.reshape(-1, CHUNK, *table.shape[1:])
-
-    def look(best: tuple[jax.Array, Vector], chunk: jax.Array):
-        height, point = best
-        # Were heights computed again for each coordinate, and rounded in
-        # another way, the point would be made of two vertices.
-        new = [dot(list(vertex), along) for vertex in chunk]
-        for own, vertex in zip(once(new), chunk, strict=True):
-            higher = own > height
-            height = jnp.where(higher, own, height)
-            point = where(higher, list(vertex), point)
-        return (height, point), None
-
-    zero = jnp.zeros_like(along[0])
-    return jax.lax.scan(look, (zero - jnp.inf, [zero] * 3), chunks)[0][1]
+    return plus(point, cores.hulls.farthest(along)) if cores.hulls else point
