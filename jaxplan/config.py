@@ -297,7 +297,7 @@ class LossConfig(Checked):
 class OptimizerConfig(Checked):
     """AdamW with warm-up and cosine decay to zero; EMA as in Diffusion Policy."""
 
-    learning_rate: Positive = 1e-4
+    learning_rate: NotNegative = 1e-4
     warmup_steps: Whole = 500
     betas: tuple[Probability, Probability] = (0.95, 0.999)
     weight_decay: NotNegative = 1e-6

@@ -311,7 +311,7 @@ def test_check_names_what_collides(capsys):
     assert "post" in output
 
 
-def test_check_suggests_what_to_exclude(tmp_path, capsys):
+def test_check_says_what_is_left_out(tmp_path, capsys):
     path = tmp_path / "robot.xml"
     path.write_text(
         """
@@ -325,8 +325,8 @@ def test_check_suggests_what_to_exclude(tmp_path, capsys):
         </worldbody></mujoco>
         """
     )
-    assert main(["check", str(path)]) == 1
-    assert '<exclude body1="a" body2="c"/>' in capsys.readouterr().out
+    assert main(["check", str(path)]) == 0
+    assert "pair left out: a[0] and c[0]" in capsys.readouterr().out
 
 
 def test_compiled_programs_are_kept(monkeypatch, tmp_path):

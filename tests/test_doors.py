@@ -30,9 +30,10 @@ from jaxplan import (
 )
 from jaxplan import make_world as world_for
 from jaxplan.blocks import SIZES
+from jaxplan.goals import Goals
 from jaxplan.questions import seeds_of
 from jaxplan.ranges import check, kinds
-from jaxplan.reason import no_path
+from jaxplan.reason import Asked, no_path
 
 ARM = """
 <mujoco>
@@ -386,9 +387,12 @@ def test_a_reason_says_what_joints_are_measured_in(joints, unit):
     goal = np.append(np.zeros(d - 1), 0.5)
     limits = -np.ones(d), np.ones(d)
     plan = Plan(Status.BUDGET_EXHAUSTED, np.zeros((1, d)), 9, 9, 0.0, "", 0, None)
-    assert f"is {unit} from" in no_path(scene, plan, goal, goal, limits, 0.0)
+    goals = Goals(goal[None], 1, None, goal[None][:0])
+    nodes = np.array([5, 5])
+    asked = Asked(scene, plan, goal, goals, limits, 0.0, nodes)
+    assert f"is {unit} from" in no_path(asked)
     plan = dataclasses.replace(plan, status=Status.OUT_OF_LIMITS)
-    said = no_path(scene, plan, 3 * np.ones(d), goal, limits, 0.0)
+    said = no_path(asked._replace(plan=plan, q_start=3 * np.ones(d)))
     kind = scene.joint_kind(scene.joints[0])
     unit = {"slide": "m", "hinge": "rad"}[kind]
     assert f"at 3.0000 {unit}, limits -1.0000 {unit} to 1.0000 {unit}" in said

@@ -241,7 +241,7 @@ def test_ao_rrt_connect_tends_to_the_shortest_path():
         steps = (np.linalg.norm(np.diff(path, axis=0), axis=1) for path in paths)
         return np.array([step.sum() for step in steps])
 
-    early, late = lengths(400), lengths(8000)
+    early, late = lengths(400), lengths(12_000)
     assert np.all(late <= early)
     assert np.all(late > 0.99 * shortest)
     assert np.median(late) < 1.05 * shortest

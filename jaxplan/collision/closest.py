@@ -3,9 +3,11 @@
 import numpy as np
 import numpy.typing as npt
 
+from jaxplan.collision.checks import checked
 from jaxplan.collision.oracle import Replica, names_of, nearest
 from jaxplan.collision.rows import clearance_rows
 from jaxplan.collision.world import World
+from jaxplan.ranges import NotNegative, check
 from jaxplan.scene import Scene, geom_pairs
 
 Named = tuple[tuple[str, str] | None, float]
@@ -29,6 +31,8 @@ def closest_pair(
         q: `[d]` joints [rad].
         reach: Pairs farther apart than this are not looked for [m]; (None, inf) then.
     """
+    world, q = checked(scene, world, q=q)
+    check("reach", reach, NotNegative)
     row = np.asarray(q, float)[None]
     theirs, geoms = next(nearest(scene, world, row, reach))
     if theirs < 0:
