@@ -74,13 +74,8 @@ class Compiled:
         return jit(lambda world, q: collision.clearance(self._scene, world, q))
 
     @cached_property
-    def free(self) -> Callable[[World, np.ndarray], jax.Array]:
-        """`(world, q) -> [...]` bool."""
-        return jit(self._config_free)
-
-    @cached_property
-    def swept(self) -> Callable[[World, np.ndarray, np.ndarray], jax.Array]:
-        """`(world, q, motion) -> [...]` bool: proven free all around."""
+    def free(self) -> Callable[..., jax.Array]:
+        """`(world, q) -> [...]` bool; `(world, q, motion)`: proven free all around."""
         return jit(self._config_free)
 
     def search(self, asked: Questions, time_limit: float = math.inf) -> PlanResult:

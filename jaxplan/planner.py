@@ -217,7 +217,7 @@ class Planner:
             speed**2 * self._acceleration,
             self._trajectory,
             self.circular,
-            lambda problem, q, motion: self._compiled.swept(world, q, motion),
+            lambda problem, q, motion: self._compiled.free(world, q, motion),
         )
         q, qd, qdd = (x[0, : timed.length[0]] for x in (timed.q, timed.qd, timed.qdd))
         free = bool(timed.rung[0] != Rung.INVALID)

@@ -14,7 +14,7 @@ import jax.numpy as jnp
 from jaxplan.planning.proposal import Draw
 from jaxplan.planning.segment import Proposal
 from jaxplan.planning.space import Space
-from jaxplan.planning.tree import Tree, at
+from jaxplan.planning.tree import Tree
 
 CHANGE = 1e-3
 """By which share a domain shrinks at a failure and grows at a success."""
@@ -71,8 +71,3 @@ def adapted(
     domain = domain.at[problem, node].multiply(change)
     domain = domain.at[problem, node].max(jnp.where(failed, least, 0.0))
     return tree._replace(domain=domain)
-
-
-def radius(tree: Tree, node: jax.Array) -> jax.Array:
-    """`[P, K]` the domains of nodes."""
-    return at(tree.domain, node)

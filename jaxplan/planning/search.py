@@ -188,7 +188,7 @@ def advance(
     q_base = configurations(state.tree, base)
     proposal, grows = move.proposal, ~control.connecting & ~move.learned
     if config.dynamic_domain > 0:
-        within = domain.radius(state.tree, base)
+        within = at(state.tree.domain, base)
         outside = grows & proposal.toward & (away > within)
         proposal = domain.nearer(proposal, draw, q_base, outside, within, space)
     q_new, reached = extend(q_base, proposal, space)
