@@ -47,7 +47,7 @@ class Hulls(NamedTuple):
         first = self.first[cell]
         last = self.first[cell + 1] - 1
         most = jnp.max(last - first)
-        steps = jnp.arange(CHUNK).reshape(-1, *[1] * cell.ndim)
+        steps = jnp.arange(CHUNK, dtype=first.dtype).reshape(-1, *[1] * cell.ndim)
 
         def look(state: tuple[jax.Array, ...]) -> tuple[jax.Array, ...]:
             done, highest, best = state
@@ -99,7 +99,7 @@ def joined(parts: Sequence[tuple[Hulls | None, int]]) -> Hulls | None:
             zero = jnp.zeros((count, 1), jnp.float32)
             hulls = Hulls(
                 zero.astype(jnp.int32),
-                zero[None] * jnp.ones((3, 1, 1)),
+                jnp.zeros((3, count, 1), jnp.float32),
                 zero,
                 point,
                 nothing,
