@@ -1,12 +1,15 @@
 """What all tests share: JAX on the CPU, off-screen rendering, reproducible examples."""
 
 import os
+import signal
+from pathlib import Path
 from typing import Any, NamedTuple
 
 # Set before JAX or MuJoCo is imported; a value from outside wins (for -m gpu).
 os.environ.setdefault("JAX_PLATFORMS", "cpu")
 os.environ.setdefault("MUJOCO_GL", "egl")
 
+import jax
 import pytest
 from hypothesis import settings
 
@@ -14,6 +17,21 @@ from hypothesis import settings
 # belong to the change that caused it.
 settings.register_profile("jaxplan", deadline=None, derandomize=True)
 settings.load_profile("jaxplan")
+
+# Background jobs of a shell ignore Ctrl-C, and so would all that they start.
+signal.signal(signal.SIGINT, signal.default_int_handler)
+
+MAPS = Path("/proc/self/maps")
+MANY = 20_000
+"""A process may have 65,530 memory maps, and each compiled program takes some."""
+
+
+@pytest.fixture(scope="module", autouse=True)
+def forget_programs():
+    """One process runs all tests: XLA crashes where it gets no more memory maps."""
+    yield
+    if MAPS.exists() and MAPS.read_bytes().count(b"\n") > MANY:
+        jax.clear_caches()
 
 
 @pytest.fixture(scope="session")

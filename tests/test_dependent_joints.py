@@ -20,6 +20,7 @@ from jaxplan.collision.oracle import mujoco_model
 from jaxplan.collision.positions import qpos_rows
 from jaxplan.planner import Planner
 from jaxplan.scene import Scene
+from jaxplan.scene.dependent import Dependent, follow, spread
 
 SEEDS = range(6)
 
@@ -452,3 +453,22 @@ def test_fingers_follow_each_other_and_the_world():
             np.testing.assert_allclose(
                 distance(scene, world, np.zeros(2), **reach), expected, atol=1e-6
             )
+
+
+def test_no_joint_gets_further_than_its_span():
+    """Chains of random polynomials; at the end of a line the span is reached."""
+    rng = np.random.default_rng(0)
+    for trial in range(200):
+        lines = trial % 2
+        chain = [
+            Dependent(0, int(rng.integers(2 + row)), tuple(rng.normal(size=n)))
+            for row, n in enumerate(rng.integers(2, 3 if lines else 6, 4))
+        ]
+        x, span = rng.uniform(-3, 3, (2, 1)), rng.uniform(0, 2, (2, 1))
+        moved = follow(chain, x)
+        shares = np.concatenate([rng.uniform(-1, 1, (2, 500)), np.ones((2, 1))], 1)
+        away = np.abs(np.stack(follow(chain, x + span * shares)) - moved)
+        most = np.stack(spread(chain, moved, span))
+        assert (away <= most * (1 + 1e-9) + 1e-12).all()
+        if lines:
+            np.testing.assert_allclose(away[:, -1:], most, rtol=1e-9)

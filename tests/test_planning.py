@@ -48,9 +48,10 @@ def settings_of(**changes):
 
 
 @cache
-def planner(config, d=7):
-    limit = np.full(d, Q_MAX)
-    return make_planner(config_free, config, -limit, limit)
+def planner(config, d=7, circular=()):
+    """`circular`: indices of joints that come round, for whoever fears no obstacles there."""
+    limit, round_ = np.full(d, Q_MAX), np.isin(np.arange(d), circular)
+    return make_planner(config_free, config, -limit, limit, circular=round_)
 
 
 @cache
@@ -373,16 +374,19 @@ def assert_free(worlds, problem, q0, q1, config):
     assert np.all(np.linalg.norm(q1 - q0, axis=-1) <= config.step_max * 1.001)
 
 
+@pytest.mark.parametrize("workers", [2, 16])
+@pytest.mark.parametrize("circular", [(), (0, 3, 6)])
 @pytest.mark.parametrize("method", METHODS)
-def test_results_do_not_depend_on_the_batch(method):
+def test_results_do_not_depend_on_the_batch(method, circular, workers):
     """A problem has the same answer alone, in company, elsewhere in it, and padded."""
     worlds, q_start, q_goal, keys = problems(12, seed=3)
-    plan = planner(settings_of(method=method, max_expansions=60, workers=2))
+    settings = settings_of(method=method, max_expansions=60, workers=workers)
+    plan = planner(settings, circular=circular)
 
     def run(lanes, active=None):
         lanes = np.asarray(lanes)
         part = jax.tree.map(lambda x: x[lanes], (worlds, q_start, q_goal, keys))
-        draw = noisy_sampler(part[1], part[2], part[3])
+        draw = noisy_sampler(part[1], part[2], part[3], 16)
         return plan(part[0], part[1], part[2], part[2], part[3], draw, active)
 
     def lanes_of(result, lanes):

@@ -76,8 +76,10 @@ def random_scene(seed: int, kinds) -> Scene:
     add_geoms(follower, rng.choice(kinds, 1), rng, 0.1)
     drive = spec.add_equality(name1="d", name2="j0", objtype=mujoco.mjtObj.mjOBJ_JOINT)
     drive.type = mujoco.mjtEq.mjEQ_JOINT
-    bends = spec.joint("j0").range[1] > spec.joint("j0").range[0]
-    drive.data[:5] = [0.3, -0.8, 0.4 * bends, 0, 0]
+    drive.data[:5] = [0.3, -0.8, 0.4, 0.1, -0.1]
+    if seed % 2:  # without limits the curve has no steepest place
+        spec.joint("j0").type, spec.joint("j0").range = HINGE, (0, 0)
+        spec.joint("d").type = SLIDE
     finger = bodies[3].add_body(name="finger", pos=[0, 0, 0.1])
     finger.add_joint(name="f", type=SLIDE, axis=[1, 0, 0], range=[0, 0.05])
     add_geoms(finger, rng.choice(kinds, 1), rng, 0.05)
@@ -169,7 +171,7 @@ def test_what_is_far_for_its_motion_is_proven(drawn: Case):
     bound = np.asarray(most(scene, world, motion, *limits(scene)))
     bound = bound * np.exp(motion.sum(-1))
     far = least > bound + BAND
-    assert far.mean() > 0.02
+    assert far.mean() > 0.01
     assert np.asarray(ask(scene, world, q, 0.0, "fast", motion))[far].all()
     lower = np.asarray(distance(scene, world, q, "fast", motion))
     for margin in (0.0, 0.02):

@@ -57,7 +57,7 @@ def group_bounds(
             geoms.append(sorted({geom for side in sides for geom in side.ids}))
             own.append(ways.of_side[index, body])
         reach += moved_by(travel, own, _each(extent.of(geoms)))
-    bounds = jnp.where(dq == 0, 0, jnp.abs(dq) * reach).sum(1)
+    bounds = jnp.where(dq == 0, 0, jnp.abs(dq) * _known(reach)).sum(1)
     return jnp.where(counting(scene, world), bounds, 0)
 
 
@@ -93,7 +93,12 @@ def _reaches(
         own = [(geom,) for geom in side]
         sides = ways.of_geoms(scene, groups, own)
         reach += moved_by(travel, sides, _each(extent.of(own)))
-    return reach[..., 0]
+    return _known(reach)[..., 0]
+
+
+def _known(reach: jax.Array | float) -> jax.Array:
+    """Infinite where there is no bound, also where that meets a lever of length 0."""
+    return jnp.where(jnp.isnan(reach), jnp.inf, reach)
 
 
 def _pairs(scene: Scene) -> list[tuple[int, tuple[int, int]]]:

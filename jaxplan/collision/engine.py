@@ -40,9 +40,12 @@ from jaxplan.collision.shapes import (
 from jaxplan.collision.world import World
 from jaxplan.scene import Scene
 
-XLA_OPTIONS: dict[str, str | bool] = {"xla_cpu_use_fusion_emitters": False}
+XLA_OPTIONS: dict[str, str | bool] = (
+    {"xla_cpu_use_fusion_emitters": False} if jax.__version_info__ < (0, 11) else {}
+)
 """Compiler options for the outermost `jax.jit` of anything that checks collisions: with
-XLA's CPU fusion emitters, kinematic chains are recomputed for every use (100x slower)."""
+XLA's CPU fusion emitters, kinematic chains are recomputed for every use (100x slower).
+Later versions of XLA refuse the option."""
 
 BLOCK = 256
 
@@ -115,7 +118,7 @@ def least_scores(
         counts = counting(scene, world)
         travel = None
         if motion is not None:
-            travel = travel_from(scene, world, ways, poses, motion)
+            travel = travel_from(scene, world, ways, poses, q, motion)
 
         def nearer(
             groups: Sequence[int], *sides: Sequence[Sequence[int]]

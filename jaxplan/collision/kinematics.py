@@ -203,18 +203,28 @@ def _matrices(quats: jax.Array) -> jax.Array:
     return jnp.moveaxis(rotation_of(quats.T), -1, 0)
 
 
-def _values(
-    scene: Scene, world: World, q: jax.Array, links: tuple[Link, ...]
-) -> jax.Array:
-    """`[n, B]` how far each joint is from its reference; 0 where there is none."""
-    dependent = scene.structure.dependent
-    variable = np.array([link.variable for link in links], int)
+def joints_moved(scene: Scene, world: World, q: jax.Array) -> jax.Array:
+    """`[n, B]` how far all joints that move are from their references.
+
+    Args:
+        scene: The scene.
+        world: Leaves with the batch last.
+        q: `[d, B]` joints [rad or m].
+    """
     passive = jnp.broadcast_to(world.passive, (len(scene.passive), q.shape[-1]))
     address = scene.addresses((*scene.joints, *scene.passive))
     reference = jnp.asarray(scene.model.qpos0)[address]
     moved = jnp.concatenate([q, passive]) - reference[:, None]
-    if dependent:
-        moved = jnp.stack(follow(dependent, moved))
+    dependent = scene.structure.dependent
+    return jnp.stack(follow(dependent, moved)) if dependent else moved
+
+
+def _values(
+    scene: Scene, world: World, q: jax.Array, links: tuple[Link, ...]
+) -> jax.Array:
+    """`[n, B]` how far each joint is from its reference; 0 where there is none."""
+    variable = np.array([link.variable for link in links], int)
+    moved = joints_moved(scene, world, q)
     return jnp.where(variable[:, None] >= 0, moved[variable], 0)
 
 

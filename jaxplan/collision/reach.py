@@ -19,6 +19,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from jaxplan.collision.kinematics import joints_moved
 from jaxplan.collision.shapes import (
     Shapes,
     Vector,
@@ -32,6 +33,7 @@ from jaxplan.collision.shapes import (
 )
 from jaxplan.collision.world import World
 from jaxplan.scene import Scene
+from jaxplan.scene.dependent import spread
 
 
 class Way(NamedTuple):
@@ -220,7 +222,12 @@ def norm(vector: Vector) -> jax.Array:
 
 
 def travel_from(
-    scene: Scene, world: World, ways: Ways, poses: jax.Array, motion: jax.Array
+    scene: Scene,
+    world: World,
+    ways: Ways,
+    poses: jax.Array,
+    q: jax.Array,
+    motion: jax.Array,
 ) -> jax.Array:
     """How far each way moves what stands at its end, from the configuration at hand.
 
@@ -229,6 +236,7 @@ def travel_from(
         world: Leaves with the batch last.
         ways: `find_ways`.
         poses: `[1 + n_links, 3, 4, B]` where the links are.
+        q: `[d, B]` the configuration [rad or m].
         motion: `[d, B]` how far each joint moves at most [rad or m].
 
     Returns:
@@ -236,8 +244,7 @@ def travel_from(
         [m], and the angles of the other joints together [rad]. Zero for a way that is not so.
     """
     anchor, axis = joint_axes(scene, poses)
-    rates = jnp.asarray(link_rates(scene), motion.dtype)
-    moved = jnp.tensordot(rates, jnp.abs(motion), 1, precision="highest")
+    moved = _link_spans(scene, world, q, jnp.abs(motion))
     slides, order = link_slides(scene)[:, None], ways.order()
     first = order[:, :1].ravel()
     twist = jnp.where(slides[first], 0, moved[first])
@@ -252,6 +259,20 @@ def travel_from(
     if any(way.held for way in ways.ways):
         travel = jnp.where(ways.so(world)[:, None], travel, 0)
     return once(travel)  # or it would be computed again for each geom
+
+
+def _link_spans(
+    scene: Scene, world: World, q: jax.Array, motion: jax.Array
+) -> jax.Array:
+    """`[1 + n_links, B]` how far the links' joints get from where they are at most."""
+    links, dependent = scene.structure.links, scene.structure.dependent
+    still = jnp.zeros((len(scene.passive), motion.shape[-1]), motion.dtype)
+    spans = [*motion, *still]
+    if dependent:
+        spans = spread(dependent, list(joints_moved(scene, world, q)), spans)
+    nothing = jnp.zeros((1, motion.shape[-1]), motion.dtype)
+    spans = jnp.concatenate([jnp.stack(spans), nothing])
+    return spans[np.array([-1, *(link.variable for link in links)])]
 
 
 def moved_by(

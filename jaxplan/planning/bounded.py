@@ -17,7 +17,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxplan.planning.proposal import Draw
-from jaxplan.planning.space import Space
+from jaxplan.planning.space import Space, dot, norm
 from jaxplan.planning.state import Control, Query
 from jaxplan.planning.tree import Tree, at
 
@@ -43,7 +43,7 @@ def informed(
     uniform = draw.uniform
     ball = draw.segment.direction * uniform[..., :1] ** (1 / d)
     gap = goal - start
-    across = jnp.linalg.norm(gap, axis=-1, keepdims=True)
+    across = norm(gap)[..., None]
     bound = query.bound[:, None]
     long = jnp.maximum(bound[..., None], across)
     finite = jnp.where(jnp.isfinite(long), long, 1.0)
@@ -52,9 +52,9 @@ def informed(
     # A reflection that takes the first axis to the line between the foci.
     first = jnp.eye(d)[0]
     mirror = gap / jnp.maximum(across, 1e-9) - first
-    norm = jnp.maximum(jnp.sum(mirror**2, -1, keepdims=True), 1e-12)
+    scale = jnp.maximum(dot(mirror, mirror), 1e-12)
     local = axes * ball
-    turned = local - 2 * mirror * jnp.sum(mirror * local, -1, keepdims=True) / norm
+    turned = local - 2 * mirror * (dot(mirror, local) / scale)[..., None]
     inside = space.project((start + goal) / 2 + turned)
     narrow = jnp.isfinite(bound)
     q_rand = draw.q_rand

@@ -23,7 +23,7 @@ from jaxplan.planning import search
 from jaxplan.planning.edges import ConfigFree, all_free
 from jaxplan.planning.result import PlanResult, Status
 from jaxplan.planning.segment import Segment
-from jaxplan.planning.space import Space
+from jaxplan.planning.space import Space, norm
 from jaxplan.planning.state import Query, State, searching
 from jaxplan.planning.sweep import SweptFree, sweep
 
@@ -187,7 +187,7 @@ def _harvest(
     anew, bound = ~sound & more, state.query.bound
     if search.optimises(config):
         # Until the budget is used, or the path is straight.
-        gaps = jnp.linalg.norm(found.path[:, 1:] - found.path[:, :-1], axis=-1)
+        gaps = norm(found.path[:, 1:] - found.path[:, :-1])
         bound = jnp.where(solved & sound, SHORTER * jnp.sum(gaps, axis=1), bound)
         straight = space.distance(state.query.q_start, state.query.q_goal)
         anew |= solved & more & (bound > straight)
@@ -249,7 +249,7 @@ def _check(
     config_free, swept_free = checks
     count, waypoints, d = found.path.shape
     dense = config.path_resolution > 0
-    gaps = jnp.linalg.norm(found.path[:, 1:] - found.path[:, :-1], axis=-1)
+    gaps = norm(found.path[:, 1:] - found.path[:, :-1])
     spacing = config.path_resolution if swept_free is None else PIECE
     places = jnp.ceil(gaps / spacing) if dense else 0 * gaps
     edge = jnp.arange(waypoints - 1)

@@ -12,6 +12,7 @@ import jax.numpy as jnp
 
 from jaxplan.config import PlannerConfig
 from jaxplan.planning.segment import Proposal, Segment, usable
+from jaxplan.planning.space import norm
 
 
 class Draw(NamedTuple):
@@ -61,9 +62,7 @@ def draw_numbers(
         uniform=uniform[..., 3 : 3 + d],
         q_rand=low + uniform[..., 3 : 3 + d] * (high - low),
         share=uniform[..., 2],
-        segment=Segment(
-            normal / jnp.linalg.norm(normal, axis=-1, keepdims=True), length
-        ),
+        segment=Segment(normal / norm(normal)[..., None], length),
     )
 
 
@@ -93,13 +92,13 @@ def mixture(
     """
     learned = learned & usable(segment)
     to_goal = ~learned & draw.goal
-    norm = jnp.linalg.norm(segment.direction, axis=-1, keepdims=True)
+    scale = norm(segment.direction)[..., None]
     length = jnp.clip(segment.length, config.step_min, config.step_max)
     based, row = segment.base is not None, learned[..., None]
     end = segment.end if based else q_goal
     proposal = Proposal(
         target=jnp.where(row, end, jnp.where(to_goal[..., None], q_goal, draw.q_rand)),
-        direction=jnp.where(row, segment.direction / norm, draw.segment.direction),
+        direction=jnp.where(row, segment.direction / scale, draw.segment.direction),
         length=jnp.where(learned, length, draw.segment.length),
         toward=jnp.where(learned, based, to_goal | (config.uniform_mode == "toward")),
     )

@@ -25,7 +25,7 @@ from jaxplan.planning.edges import ConfigFree, motions_free
 from jaxplan.planning.proposal import draw_numbers
 from jaxplan.planning.result import PlanResult, Status
 from jaxplan.planning.segment import Segment, extend
-from jaxplan.planning.space import Space
+from jaxplan.planning.space import Space, norm
 from jaxplan.planning.state import Move, Outcome, Query, State, choose
 from jaxplan.planning.tree import (
     at,
@@ -192,7 +192,7 @@ def advance(
         outside = grows & proposal.toward & (away > within)
         proposal = domain.nearer(proposal, draw, q_base, outside, within, space)
     q_new, reached = extend(q_base, proposal, space)
-    length = jnp.linalg.norm(q_new - q_base, axis=-1)
+    length = norm(q_new - q_base)
     cost = at(state.tree.cost, base) + length
     moves = reached | (length > 1e-6)
     if optimises(config):

@@ -17,7 +17,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxplan.planning.space import Space
+from jaxplan.planning.space import Space, norm
 
 SNAP = 1.0001
 """A target this share of a step away is reached: without it, a straight motion of a whole
@@ -38,8 +38,8 @@ class Segment(NamedTuple):
     def end(self) -> jax.Array:
         """`[..., d]` where a segment with a base is meant to lead [rad]."""
         assert self.base is not None
-        norm = jnp.linalg.norm(self.direction, axis=-1, keepdims=True)
-        return self.base + self.length[..., None] * self.direction / norm
+        scale = norm(self.direction)[..., None]
+        return self.base + self.length[..., None] * self.direction / scale
 
     def reversed(self) -> "Segment":
         """The way back."""
@@ -74,8 +74,8 @@ def straightened(
 
 def usable(segment: Segment) -> jax.Array:
     """Which segments are a move at all: finite, with a direction other than zero."""
-    norm = jnp.linalg.norm(segment.direction, axis=-1)
-    moves = jnp.isfinite(norm) & (norm > 1e-6) & jnp.isfinite(segment.length)
+    length = norm(segment.direction)
+    moves = jnp.isfinite(length) & (length > 1e-6) & jnp.isfinite(segment.length)
     if segment.base is None:
         return moves
     return moves & jnp.all(jnp.isfinite(segment.base), axis=-1)
@@ -96,7 +96,7 @@ def extend(
         in joints that come round, some turns from it.
     """
     gap = space.gap(q_base, proposal.target)
-    distance = jnp.linalg.norm(gap, axis=-1)
+    distance = norm(gap)
     reached = proposal.toward & (distance <= SNAP * proposal.length)
     straight = gap / jnp.maximum(distance, 1e-9)[..., None]
     direction = jnp.where(proposal.toward[..., None], straight, proposal.direction)

@@ -13,6 +13,20 @@ ROAM = 10.0
 TURN = 2 * math.pi
 
 
+def dot(a: jax.Array, b: jax.Array) -> jax.Array:
+    """Products over the last axis `[..., d]`, summed joint by joint.
+
+    XLA on CPU does not vectorise a reduction over so short an axis, and rounds it one way in
+    one program and another way in the next: an answer would depend on the batch's size.
+    """
+    return sum(a[..., j] * b[..., j] for j in range(a.shape[-1]))  # type: ignore
+
+
+def norm(vectors: jax.Array) -> jax.Array:
+    """Lengths over the last axis `[..., d]`."""
+    return jnp.sqrt(dot(vectors, vectors))
+
+
 @dataclasses.dataclass(frozen=True, eq=False)
 class Space:
     """Where d joints can be. Static: it is read while a search is traced.

@@ -164,6 +164,32 @@ def follow(dependent: Sequence[Dependent], moved: Iterable[Any]) -> list[Any]:
     return moved
 
 
+def spread(
+    dependent: Sequence[Dependent], moved: Sequence[Any], spans: Iterable[Any]
+) -> list[Any]:
+    """How far all joints get from where they are, at most.
+
+    Args:
+        dependent: As in the structure.
+        moved: How far all joints are from their references, as `follow` says.
+        spans: For each joint that follows nothing, how far that gets at most.
+
+    Returns:
+        `spans`, and then one for each dependent joint.
+    """
+    spans = list(spans)
+    for _, master, polycoef in dependent:
+        x, span, taylor = moved[master], spans[master], list(polycoef)
+        for j in range(len(taylor)):  # around x, by synthetic division
+            for k in reversed(range(j, len(taylor) - 1)):
+                taylor[k] = taylor[k] + x * taylor[k + 1]
+        reach = 0 * span
+        for c in reversed(taylor[1:]):
+            reach = (reach + abs(c)) * span
+        spans.append(reach)
+    return spans
+
+
 def narrow(
     dependent: Sequence[Dependent], limits: Sequence[Interval]
 ) -> list[list[Interval]]:
