@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 
-from jaxplan.collision import XLA_OPTIONS, World
+from jaxplan.collision import World, per_scene
 from jaxplan.collision.kinematics import frame_jacobian, in_float32, rotation_of
 from jaxplan.pose import Region
 from jaxplan.scene import Scene
@@ -55,7 +55,7 @@ class Misfit(NamedTuple):
     """`[6, d, B]` its derivative by the joints."""
 
 
-@partial(jax.jit, static_argnames="body", compiler_options=XLA_OPTIONS)
+@partial(per_scene, static_argnames="body")
 def descend(
     scene: Scene,
     world: World,

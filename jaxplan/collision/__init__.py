@@ -7,6 +7,7 @@ from jaxplan.collision.engine import XLA_OPTIONS as XLA_OPTIONS
 from jaxplan.collision.margins import required_clearances as required_clearances
 from jaxplan.collision.obstacles import Obstacle as Obstacle
 from jaxplan.collision.oracle import clearance_mujoco as clearance_mujoco
+from jaxplan.collision.programs import per_scene as per_scene
 from jaxplan.collision.queries import clearance as clearance
 from jaxplan.collision.queries import config_free as config_free
 from jaxplan.collision.queries import motion_bound as motion_bound

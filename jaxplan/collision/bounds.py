@@ -4,14 +4,13 @@ As in `reach`, but rho is the greatest that it can be: from a joint's axis acros
 joint's anchor, then all the way along the arm, slides at their ends.
 """
 
-from functools import partial
-
 import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxplan.collision.engine import XLA_OPTIONS, counting
+from jaxplan.collision.engine import counting
 from jaxplan.collision.kinematics import link_poses
+from jaxplan.collision.programs import per_scene
 from jaxplan.collision.reach import (
     Extent,
     Ways,
@@ -78,7 +77,7 @@ def pair_reaches(scene: Scene, world: World) -> np.ndarray:
     return table
 
 
-@partial(jax.jit, compiler_options=XLA_OPTIONS)
+@per_scene
 def _reaches(
     scene: Scene, world: World, limits: tuple[jax.Array, jax.Array]
 ) -> jax.Array:

@@ -1,11 +1,10 @@
 """Our own distance for any number of configurations, compiled once."""
 
-from functools import partial
-
 import jax
 import numpy as np
 
-from jaxplan.collision.engine import BLOCK, XLA_OPTIONS
+from jaxplan.collision.engine import BLOCK
+from jaxplan.collision.programs import per_scene
 from jaxplan.collision.queries import clearance
 from jaxplan.collision.world import World
 from jaxplan.scene import Scene
@@ -37,7 +36,7 @@ def clearance_rows(
     return np.concatenate([*found, []])[: len(rows)]
 
 
-@partial(jax.jit, compiler_options=XLA_OPTIONS)
+@per_scene
 def _block(
     scene: Scene, world: World, q: jax.Array, motion: jax.Array | None = None
 ) -> jax.Array:
