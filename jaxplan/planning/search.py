@@ -305,7 +305,7 @@ def _check(
 
 def rows_for(lanes: int, config: PlannerConfig) -> int:
     """Configurations of one call: a single search has few at a time."""
-    return min(config.check_rows, max(32, 2 * lanes * config.workers))
+    return min(config.check_rows, max(16, lanes * config.workers))
 
 
 def waypoints(config: PlannerConfig) -> int:
