@@ -70,7 +70,9 @@ def _grown(config, d):
 
     def begin(query):
         query, status = search.examine(query, space)
-        return lanes.begin(query, status, len(status), space, config), query, status
+        empty = lanes.empty(query, len(status), space, config)
+        new = jnp.array(True)
+        return lanes.begin(empty, new, query, status, space, config), query, status
 
     return jax.jit(begin), grow
 

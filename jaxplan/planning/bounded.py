@@ -17,7 +17,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxplan.planning.proposal import Draw
-from jaxplan.planning.space import Space, dot, norm
+from jaxplan.planning.space import Space, dot, norm, rounded
 from jaxplan.planning.state import Control, Query
 from jaxplan.planning.tree import Tree, at
 
@@ -54,7 +54,7 @@ def informed(
     mirror = gap / jnp.maximum(across, 1e-9) - first
     scale = jnp.maximum(dot(mirror, mirror), 1e-12)
     local = axes * ball
-    turned = local - 2 * mirror * (dot(mirror, local) / scale)[..., None]
+    turned = local - rounded(2 * mirror * (dot(mirror, local) / scale)[..., None])
     inside = space.project((start + goal) / 2 + turned)
     narrow = jnp.isfinite(bound)
     q_rand = draw.q_rand

@@ -13,7 +13,7 @@ import jax.numpy as jnp
 
 from jaxplan.planning.proposal import Draw
 from jaxplan.planning.segment import Proposal
-from jaxplan.planning.space import Space
+from jaxplan.planning.space import Space, rounded
 from jaxplan.planning.tree import Tree
 
 CHANGE = 1e-3
@@ -40,7 +40,8 @@ def nearer(
     """
     d = q_base.shape[-1]
     radius = domain * draw.share ** (1 / d)
-    offset = jnp.where(outside, radius, 0.0)[..., None] * draw.segment.direction
+    length = jnp.where(outside, radius, 0.0)[..., None]
+    offset = rounded(length * draw.segment.direction)
     target = jnp.where(
         outside[..., None], space.project(q_base + offset), proposal.target
     )

@@ -48,36 +48,65 @@ class Lanes(NamedTuple):
     """Of the problems; what is not over yet is empty."""
 
 
-def begin(
-    query: Query, status: jax.Array, lanes: int, space: Space, config: PlannerConfig
-) -> Lanes:
-    """Loads the first L of P problems.
+def empty(query: Query, lanes: int, space: Space, config: PlannerConfig) -> Lanes:
+    """Lanes that search nothing, for questions like those of `query`.
 
     Args:
         query: P problems.
-        status: `[P]` from `search.examine`.
         lanes: L, at most P.
         space: Of the configurations.
         config: Planner settings.
     """
-    problem = jnp.arange(lanes, dtype=jnp.int32)
     problems, d = query.q_start.shape
     first = jax.tree.map(lambda leaf: leaf[:lanes], query)
-    state = search.empty(first, space, config)
-    every = jnp.ones(lanes, bool)
-    state = search.start(state, every, *_load(query, status, problem), space, config)
     zero = jnp.zeros(problems, jnp.int32)
     answers = PlanResult(
         path=jnp.zeros((problems, search.waypoints(config), d)),
         path_length=zero,
-        status=status,
+        status=zero,
         expansions=zero,
         accepted=zero,
         learned=zero,
         checks=zero,
         nodes=jnp.zeros((problems, 2), jnp.int32),
     )
-    return Lanes(state, problem, every, jnp.int32(lanes), answers)
+    return Lanes(
+        state=search.empty(first, space, config),
+        problem=jnp.full(lanes, problems, jnp.int32),
+        fresh=jnp.zeros(lanes, bool),
+        taken=jnp.int32(lanes),
+        answers=answers,
+    )
+
+
+def begin(
+    lanes: Lanes,
+    new: jax.Array,
+    query: Query,
+    status: jax.Array,
+    space: Space,
+    config: PlannerConfig,
+) -> Lanes:
+    """Loads the first L of P problems if they are `new`.
+
+    Args:
+        lanes: From `empty`, or of other problems that are over; else they stay as they are.
+        new: Whether the problems are others than before.
+        query: P problems.
+        status: `[P]` from `search.examine`.
+        space: Of the configurations.
+        config: Planner settings.
+    """
+    count = len(lanes.problem)
+    problem, every = jnp.arange(count, dtype=jnp.int32), jnp.ones(count, bool)
+    where = every & new
+    loaded = _load(query, status, problem)
+    state = search.start(lanes.state, where, *loaded, space, config)
+    state = _counted_anew(state, where)
+    nothing = jax.tree.map(jnp.zeros_like, lanes.answers)._replace(status=status)
+    first = Lanes(state, problem, every, jnp.int32(count), nothing)
+    chosen = jax.tree.map(partial(jnp.where, new), first[1:], lanes[1:])
+    return Lanes(state, *chosen)
 
 
 def run(
@@ -204,16 +233,21 @@ def _harvest(
     state = search.start(state, begins, asked, known, space, config)
     # A new attempt goes on counting, and so draws other random numbers.
     state = state._replace(attempt=state.attempt + (anew & ~sound))
-    for name in ("chunk", "used", "expansions", "accepted", "checks", "attempt"):
-        count = jnp.where(loaded, 0, getattr(state, name))
-        state = state._replace(**{name: count})
     return Lanes(
-        state=state,
+        state=_counted_anew(state, loaded),
         problem=problem,
         fresh=loaded,
         taken=lanes.taken + jnp.sum(done, dtype=jnp.int32),
         answers=answers,
     )
+
+
+def _counted_anew(state: State, where: jax.Array) -> State:
+    """All counters are 0 `where [L]` a problem is another one."""
+    for name in ("chunk", "used", "expansions", "accepted", "checks", "attempt"):
+        count = jnp.where(where, 0, getattr(state, name))
+        state = state._replace(**{name: count})
+    return state
 
 
 def _write(

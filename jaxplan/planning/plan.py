@@ -84,12 +84,20 @@ def make_planner(
     def run(
         worlds: Worlds,
         state: lanes.Lanes,
+        new: jax.Array,
         query: Query,
-        status: jax.Array,
+        active: jax.Array,
         bank: Segment | None,
         rounds: jax.Array,
         stop: jax.Array,
     ) -> lanes.Lanes:
+        query, status = search.examine(query, space)
+        status = jnp.where(active, status, Status.INACTIVE).astype(jnp.int32)
+        state = lanes.begin(state, new, query, status, space, config)
+        if bank is not None:  # there is none yet
+            chunk = jnp.where(new, -1, state.state.chunk)
+            state = state._replace(state=state.state._replace(chunk=chunk))
+
         def free(problem, q):
             return config_free(worlds, problem, q)
 
@@ -103,20 +111,15 @@ def make_planner(
         )
 
     @jit
-    def begin(query: Query, active: jax.Array, bank: Segment | None):
-        query, status = search.examine(query, space)
-        status = jnp.where(active, status, Status.INACTIVE).astype(jnp.int32)
-        count = len(active)
-        if bank is None:
-            return lanes.begin(
-                query, status, min(count, config.lanes), space, config
-            ), query, status  # fmt: skip
-        # A lane for each problem: the sampler's banks are by problem. There is none yet.
-        state = lanes.begin(query, status, count, space, config)
-        chunk = jnp.full_like(state.state.chunk, -1)
-        return state._replace(state=state.state._replace(chunk=chunk)), query, status
+    def empty(query: Query, bank: Segment | None) -> lanes.Lanes:
+        # With a bank a lane for each problem: the sampler's banks are by problem.
+        count = len(query.q_start)
+        rows = count if bank is not None else min(count, config.lanes)
+        return lanes.empty(query, rows, space, config)
 
     advance = jit(run, donate_argnums=1)
+    used: dict[tuple[int, ...], list[lanes.Lanes]] = {}
+    """Lanes of single problems that are over: getting memory is a good part of a question."""
     rows: list[int] = []
     """M, once a bank was seen."""
 
@@ -153,19 +156,28 @@ def make_planner(
             raise ValueError(f"{config.method} has one goal; several need rrt_connect")
         active = np.ones(problems, bool) if active is None else np.asarray(active, bool)
         bank = first_bank(draw, problems)
-        state, query, status = begin(query, active, bank)
-        go, halt = np.False_, np.True_
+        kept = used.setdefault((problems, query.goals.shape[1], bank is None), [])
+        state = kept.pop() if kept else empty(query, bank)
+        new, go, halt = np.True_, np.False_, np.True_
+
+        def over(state: lanes.Lanes) -> PlanResult:
+            answers = jax.tree.map(np.array, state.answers)
+            if problems == 1:
+                kept.append(state)
+            return answers
+
         while True:
             began = time.perf_counter()
             left = end - began
             wanted = SLICE if left > 2 * SLICE else min(LAST_SLICE, left / 2)
             rounds = FIRST_SLICE if math.isinf(pace) else wanted / pace
             rounds = np.int32(np.clip(rounds, 1, 2**30))
-            state = advance(worlds, state, query, status, bank, rounds, go)
+            state = advance(worlds, state, new, query, active, bank, rounds, go)
+            new = np.False_
             problem = np.asarray(state.problem)
             open_ = problem < problems
             if not open_.any():
-                return state.answers
+                return over(state)
             if np.asarray(state.state.waiting).any():
                 assert draw is not None
                 bank = draw(state.state.chunk)
@@ -176,10 +188,10 @@ def make_planner(
         late = np.zeros(problems, bool)
         late[problem[open_]] = late[int(state.taken) :] = True
         last = np.int32(2**30)
-        answers = advance(worlds, state, query, status, bank, last, halt).answers
-        late &= np.asarray(answers.status) == Status.BUDGET_EXHAUSTED
-        status = jnp.where(late, Status.TIME_OUT, answers.status)
-        return answers._replace(status=status.astype(jnp.int32))
+        answers = over(advance(worlds, state, new, query, active, bank, last, halt))
+        late &= answers.status == Status.BUDGET_EXHAUSTED
+        status = np.where(late, Status.TIME_OUT, answers.status).astype(np.int32)
+        return answers._replace(status=status)
 
     return plan
 

@@ -12,7 +12,7 @@ import jax.numpy as jnp
 
 from jaxplan.config import PlannerConfig
 from jaxplan.planning.segment import Proposal, Segment, usable
-from jaxplan.planning.space import norm
+from jaxplan.planning.space import norm, rounded
 
 
 class Draw(NamedTuple):
@@ -55,12 +55,13 @@ def draw_numbers(
     bits = jax.vmap(jax.vmap(one, (None, 0)))(keys, expansion)
     uniform = (bits >> 9).astype(jnp.float32) * 2.0**-23 + 2.0**-24  # inside (0, 1)
     normal = jax.scipy.special.ndtri(uniform[..., 3 + d :])
-    length = config.step_min + uniform[..., 2] * (config.step_max - config.step_min)
+    span = config.step_max - config.step_min
+    length = config.step_min + rounded(uniform[..., 2] * span)
     return Draw(
         learned=uniform[..., 0] >= config.p_uniform,
         goal=uniform[..., 1] < config.goal_bias,
         uniform=uniform[..., 3 : 3 + d],
-        q_rand=low + uniform[..., 3 : 3 + d] * (high - low),
+        q_rand=low + rounded(uniform[..., 3 : 3 + d] * (high - low)),
         share=uniform[..., 2],
         segment=Segment(normal / norm(normal)[..., None], length),
     )

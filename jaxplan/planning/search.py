@@ -88,7 +88,7 @@ def empty(query: Query, space: Space, config: PlannerConfig) -> State:
         query=query,
         tree=bare(problems, joints, config.max_expansions + roots),
         control=METHODS[config.method].begin(query, space, config),
-        status=jnp.full_like(zero, Status.INACTIVE),
+        status=jnp.full(problems, int(Status.INACTIVE), jnp.int32),
         waiting=jnp.zeros_like(zero, bool),
         chunk=zero,
         used=zero,

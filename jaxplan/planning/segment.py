@@ -17,7 +17,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxplan.planning.space import Space, norm
+from jaxplan.planning.space import Space, norm, rounded
 
 SNAP = 1.0001
 """A target this share of a step away is reached: without it, a straight motion of a whole
@@ -39,7 +39,7 @@ class Segment(NamedTuple):
         """`[..., d]` where a segment with a base is meant to lead [rad]."""
         assert self.base is not None
         scale = norm(self.direction)[..., None]
-        return self.base + self.length[..., None] * self.direction / scale
+        return self.base + rounded(self.length[..., None] * self.direction / scale)
 
     def reversed(self) -> "Segment":
         """The way back."""
@@ -100,7 +100,7 @@ def extend(
     reached = proposal.toward & (distance <= SNAP * proposal.length)
     straight = gap / jnp.maximum(distance, 1e-9)[..., None]
     direction = jnp.where(proposal.toward[..., None], straight, proposal.direction)
-    q_new = space.project(q_base + proposal.length[..., None] * direction)
+    q_new = space.project(q_base + rounded(proposal.length[..., None] * direction))
     target = proposal.target
     if space.turns:
         target = jnp.where(np.array(space.circular), q_base + gap, target)

@@ -13,13 +13,20 @@ ROAM = 10.0
 TURN = 2 * math.pi
 
 
-def dot(a: jax.Array, b: jax.Array) -> jax.Array:
-    """Products over the last axis `[..., d]`, summed joint by joint.
+def rounded(product: jax.Array) -> jax.Array:
+    """A product that is rounded before something is added to it.
 
-    XLA on CPU does not vectorise a reduction over so short an axis, and rounds it one way in
-    one program and another way in the next: an answer would depend on the batch's size.
+    Else one program multiplies and adds in one instruction and the next one does not, and an
+    answer would depend on the size of its batch. XLA on CPU looks past barriers, and not
+    through a maximum.
     """
-    return sum(a[..., j] * b[..., j] for j in range(a.shape[-1]))  # type: ignore
+    return jnp.maximum(product, -jnp.finfo(jnp.float32).max)
+
+
+def dot(a: jax.Array, b: jax.Array) -> jax.Array:
+    """Products over the last axis `[..., d]`, summed joint by joint."""
+    products = rounded(a * b)
+    return sum(products[..., j] for j in range(products.shape[-1]))  # type: ignore
 
 
 def norm(vectors: jax.Array) -> jax.Array:
@@ -87,9 +94,8 @@ class Space:
         gap = q1 - q0
         if not self.turns:
             return gap
-        return jnp.where(
-            np.array(self.circular), gap - TURN * jnp.round(gap / TURN), gap
-        )
+        short = gap - rounded(TURN * jnp.round(gap / TURN))
+        return jnp.where(np.array(self.circular), short, gap)
 
     def distance(self, q0: jax.Array, q1: jax.Array) -> jax.Array:
         """d(q, q') over the last axis."""

@@ -43,7 +43,7 @@ def bare(problems: int, joints: int, capacity: int) -> Tree:
     q = jnp.zeros((problems, joints, capacity))
     cost = jnp.zeros((problems, capacity))
     none = jnp.zeros(problems, jnp.int32)
-    return Tree(q, nodes, nodes, cost, jnp.full_like(cost, jnp.inf), none, none)
+    return Tree(q, nodes, nodes, cost, cost, none, none)
 
 
 def plant(tree: Tree, roots: jax.Array, where: jax.Array) -> Tree:
@@ -63,7 +63,7 @@ def plant(tree: Tree, roots: jax.Array, where: jax.Array) -> Tree:
         parent=set_(tree.parent, jnp.full((1, sides), NO_PARENT)),
         side=set_(tree.side, jnp.minimum(jnp.arange(sides), 1)[None]),
         cost=set_(tree.cost, jnp.zeros((1, sides))),
-        domain=jnp.where(where[:, None], jnp.inf, tree.domain),
+        domain=set_(tree.domain, jnp.full((1, sides), jnp.inf)),
         size=jnp.where(where, sides, tree.size),
         behind=jnp.where(where, sides - 1, tree.behind),
     )
@@ -174,6 +174,7 @@ def insert(
         parent=tree.parent.at[problem, index].set(parent, mode="drop"),
         side=tree.side.at[problem, index].set(side, mode="drop"),
         cost=tree.cost.at[problem, index].set(cost, mode="drop"),
+        domain=tree.domain.at[problem, index].set(jnp.inf, mode="drop"),
         size=tree.size + jnp.sum(keep, axis=1, dtype=jnp.int32),
         behind=tree.behind + jnp.sum(keep & (side == 1), axis=1, dtype=jnp.int32),
     )
