@@ -38,6 +38,8 @@ class Args:
     """5 problems a set."""
     sets: tuple[str, ...] = ()
     """All by default."""
+    give_up: float = 10.0
+    """When OMPL does [s]; a problem that it has not solved by then counts as that long."""
 
 
 def main(args: Args) -> None:
@@ -51,7 +53,7 @@ def main(args: Args) -> None:
     bad: list[str] = []
     for name in args.sets or every:
         problems = every[name][: 5 if args.quick else None]
-        found = ask(robot, name, problems, range(len(problems)))
+        found = ask(robot, name, problems, range(len(problems)), args.give_up)
         smooth = smoothed(robot, found[OURS])
         for row in rows_of(PART, name, found):
             more = dict(row.more)
@@ -75,6 +77,7 @@ def main(args: Args) -> None:
         "counts": part.counts,
         "refused": bad,
         "quick": args.quick,
+        "give_up": args.give_up,
         "load": [load, os.getloadavg()],
         "versions": versions() | peer_versions(),
     }

@@ -52,9 +52,13 @@ def planner_for(
 
 
 def ask(
-    robot: dict, name: str, problems: Sequence[Problem], seeds: Sequence[int]
+    robot: dict,
+    name: str,
+    problems: Sequence[Problem],
+    seeds: Sequence[int],
+    give_up: float = 10.0,
 ) -> dict[str, list[Query]]:
-    """Answers of each side that is here to all problems."""
+    """Answers of each side that is here to all problems; OMPL gives up after so many seconds."""
     planner, worlds = planner_for(robot, problems)
 
     def ours(i: int) -> Planned:
@@ -67,7 +71,7 @@ def ask(
     ours(0)  # compiles
     sides: dict[str, Callable[[int], Planned]] = {OURS: ours}
     if not absent("ompl"):
-        sides |= _ompl_sides(robot, problems, seeds)
+        sides |= _ompl_sides(robot, problems, seeds, give_up)
     found: dict[str, list[Query]] = {side: [] for side in sides}
     for i in tqdm(range(len(problems)), desc=name, unit="problem"):
         for side, solve in sides.items():
@@ -118,7 +122,7 @@ def _scene(robot: dict, problem: Problem) -> Scene:
 
 
 def _ompl_sides(
-    robot: dict, problems: Sequence[Problem], seeds: Sequence[int]
+    robot: dict, problems: Sequence[Problem], seeds: Sequence[int], give_up: float
 ) -> dict[str, Callable[[int], Planned]]:
     from ompl_peer import OmplPlanner
 
@@ -128,7 +132,7 @@ def _ompl_sides(
         def solve(i: int) -> Planned:
             problem = problems[i]
             return planners[id(problem), range].solve(
-                problem.q_start, problem.q_goal, seeds[i]
+                problem.q_start, problem.q_goal, seeds[i], give_up
             )
 
         return solve

@@ -112,7 +112,9 @@ class _Questioner:
         self.judged.counts["asked alone"] += 1
         plan = planner.plan(ends[0], ends[1], 0, other.world, time_limit=LIMIT)
         late = "TIME_OUT" in (plan.status.name, other.status.name)
-        if not late and not np.array_equal(plan.path, other.path):
+        # To the last bit; but not where XLA is told to optimise nothing.
+        same = plan.path.shape == other.path.shape
+        if not late and not (same and np.allclose(plan.path, other.path, atol=ALIKE)):
             yield f"alone {plan.status.name}, in a batch {other.status.name}: not the same"
         off = np.abs(
             np.minimum(planner.clearance(q, other.world), 1) - np.minimum(ours, 1)
