@@ -67,10 +67,18 @@ def main(args: Args) -> None:
                     "refused"
                 ]
             part.rows.append(replace(row, more=more))
-    part.ratios.update(compare(part.rows, OURS, 0.6) | compare(_p95(part), OURS, 0.6))
+        save(args, part, bad, load)
     show(part)
     for line in bad:
         print(f"refused: {line}")
+    print(f"written to {args.out}")
+
+
+def save(
+    args: Args, part: Part, bad: list[str], load: tuple[float, float, float]
+) -> None:
+    """Writes what there is so far."""
+    part.ratios.update(compare(part.rows, OURS, 0.6) | compare(_p95(part), OURS, 0.6))
     result = {
         "rows": [asdict(row) for row in part.rows],
         "ratios": {name: ratio.value for name, ratio in part.ratios.items()},
@@ -83,7 +91,6 @@ def main(args: Args) -> None:
     }
     args.out.parent.mkdir(parents=True, exist_ok=True)
     args.out.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
-    print(f"written to {args.out}")
 
 
 def smoothed(robot: dict, queries: list[Query]) -> float | None:
