@@ -1,18 +1,23 @@
-"""Writes RESULTS.md from the JSON files in `eval/results/`: no figure is typed by hand.
+"""Writes RESULTS.md and `docs/results/` from the JSON files in `eval/results/`.
 
     python eval/report.py
 
-A file that is not there is a line that says which command makes it.
+No figure is typed by hand: RESULTS.md has a summary of each section, its page all tables. A file
+that is not there is a line that says which command makes it.
 """
 
 import json
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import summary
+from summary import PAPER_ERROR, PAPER_NOMINAL, PAPER_SUCCESS, Found, rate
+
 from jaxplan.cli import run_script
 from jaxplan.data import write_atomic
-from jaxplan.evaluation.tables import Estimate, Table, markdown, table
+from jaxplan.evaluation.tables import Table, markdown, table
 
 ROOT = Path(__file__).parents[1]
 RESULTS = Path(__file__).parent / "results"
@@ -21,15 +26,19 @@ RESULTS = Path(__file__).parent / "results"
 class Section(NamedTuple):
     """A heading, the files whose tables stand under it, and what differs from the paper."""
 
+    page: str
+    """Its file under `docs/results/`."""
     title: str
     files: tuple[str, ...]
     command: str
     """Makes the files; the JSON says what was really run."""
     differs: str
+    summary: Callable[[Found], Table] | None
 
 
 SECTIONS = (
     Section(
+        "success",
         "Table 1, our row, and Table 5, nominal: success and toggle error",
         ("success", "success_cluttered"),
         "python eval/success.py --seeds 200000:200300 --out eval/results/success.json",
@@ -37,8 +46,10 @@ SECTIONS = (
         "mug, grasps that hold by friction alone. The paper's toggle error is to the nearest "
         "toggle of the episode; the stricter one is to the toggle that comes next, L2 over the "
         "joints.",
+        summary.success,
     ),
     Section(
+        "expansions",
         "Table 2: normalised RRT expansions",
         ("expansions_plain", "expansions_cluttered"),
         "python eval/expansions.py --variant plain",
@@ -57,15 +68,19 @@ SECTIONS = (
         "with more weight on its KL divergence it keeps to their middle and does far worse. "
         "In the plain scene the straight motion of a blocked phase grazes an obstacle, and "
         "any sample beside it lets RRT-Connect pass: there uniform samples do best.",
+        summary.expansions,
     ),
     Section(
+        "proposals",
         "Table 3: time of one proposal",
         ("proposal_time",),
         "python eval/proposal_time.py",
         "Batch 1, planner excluded, as in the paper, and beside it what the planner really pays: "
         "segments drawn many at a time.",
+        summary.proposals,
     ),
     Section(
+        "first_solutions",
         "Table 4: time to first solution of an episode",
         ("ttfs_plain", "ttfs_rrt_plain", "ttfs_cluttered", "ttfs_rrt_cluttered"),
         "python eval/ttfs.py --variant plain",
@@ -73,30 +88,35 @@ SECTIONS = (
         "take turns at each phase, so that ratios hold. Segments come in banks, drawn when a "
         "search asks for the first; the paper draws one proposal at a time, whose price is the "
         "column of that name.",
+        summary.first_solutions,
     ),
     Section(
+        "ablations",
         "Ablations",
         ("ablations_plain", "ablations_cluttered"),
         "python eval/ablations.py --variant plain",
         "The paper has T = 10 beside T = 25 and gives no other ablation.",
+        None,
     ),
     Section(
+        "recovery",
         "Recovery after a failed grasp",
         ("success_noisy", "success_noisy_regrasp"),
         "python eval/success.py --seeds 210000:210064 --study.prediction-noise 0.03 "
         "--study.rollout.regrasp --out eval/results/success_noisy_regrasp.json",
         "Not in the paper. No grasp fails with the shipped weights, so each joint of what the "
         "upper network says gets noise of 0.03 rad here: without recovery and with it.",
+        summary.recovery,
     ),
     Section(
+        "speed",
         "Speed beside MuJoCo, OMPL, PyBullet and PyTorch",
         ("benchmark", "motion_bench"),
         "python eval/benchmark.py --update-baseline",
         "Not in the paper. Both sides of a ratio were measured in one run on one machine.",
+        summary.speed,
     ),
 )
-PAPER_SUCCESS, PAPER_NOMINAL, PAPER_ERROR = 95.67, 96.0, 0.0112
-"""Success of Table 1 and of Table 5 [%], toggle error of Table 5 [rad]."""
 FIGURES = {
     "figure2.png": "Figure 2: proposals (blue) on the way to a grasp and to a release.",
     "figure3.png": "Figure 3: one episode.",
@@ -107,48 +127,75 @@ FIGURES = {
 
 @dataclass(frozen=True)
 class Args:
-    """Writes RESULTS.md."""
+    """Writes RESULTS.md and the pages that it leads to."""
 
     results: Path = RESULTS
-    out: Path = ROOT / "RESULTS.md"
+    out: Path = ROOT
 
 
 def main(args: Args) -> None:
-    """Writes the page."""
-    write_atomic(args.out, report(args.results).encode())
-    print(f"written to {args.out}")
+    """Writes the pages."""
+    for name, text in report(args.results).items():
+        path = args.out / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        write_atomic(path, text.encode())
+        print(f"written to {path}")
 
 
-def report(results: Path = RESULTS, root: Path = ROOT) -> str:
-    """The page as text."""
-    found = {
-        name: json.loads(path.read_text(encoding="utf-8"))
-        for section in SECTIONS
-        for name in section.files
-        if (path := results / f"{name}.json").is_file()
-    }
+def report(results: Path = RESULTS, root: Path = ROOT) -> dict[str, str]:
+    """The pages as text, by their path from the repository's root."""
     parts = [
         "# Results\n",
         "Made by `python eval/report.py` from `eval/results/*.json`. A figure in brackets is a "
-        "95 % interval. Paper: Lee and Cho, Electronics 2025, 14, 4837.\n",
-        _worse(found),
+        "95 % interval. Paper: Lee and Cho, Electronics 2025, 14, 4837. Each page has all tables, "
+        "the commands, and what differs from the paper.\n",
     ]
+    pages = {}
     for section in SECTIONS:
-        parts.append(f"## {section.title}\n\n{section.differs}\n")
-        present = [name for name in section.files if name in found]
-        if not present:
-            parts.append(f"Not measured: `{section.command}`.\n")
-        for name in present:
-            parts.append(_origin(name, found[name]))
-            parts += [f"**{t.title}**\n\n{markdown(t)}" for t in tables(found[name])]
+        found = {
+            name: json.loads(path.read_text(encoding="utf-8"))
+            for name in section.files
+            if (path := results / f"{name}.json").is_file()
+        }
+        pages[f"docs/results/{section.page}.md"] = _page(section, found)
+        parts.append(f"## [{section.title}](docs/results/{section.page}.md)\n")
+        if not found:
+            parts.append(_missing(section))
+        elif section.summary is not None:
+            parts.append(markdown(section.summary(found)))
+        parts += [_worse(found)] if _worse(found) else []
     pictures = [
         f"![{caption}](docs/figures/{name})\n\n{caption}\n"
         for name, caption in FIGURES.items()
         if (root / "docs" / "figures" / name).is_file()
     ]
     if pictures:
-        parts += ["## Figures 2 to 5\n\nMade by `python eval/figures.py`.\n", *pictures]
+        parts += [
+            "## Figures 2 to 5\n\nMade by `python eval/figures.py`.\n",
+            *pictures,
+        ]
+    return {"RESULTS.md": "\n".join(parts)} | pages
+
+
+def _page(section: Section, found: Found) -> str:
+    """All tables of a section, with the commands that made them."""
+    parts = [f"# {section.title}\n\n{section.differs}\n"]
+    for name, result in found.items():
+        parts += [f"## {name}\n", _origin(name, result)]
+        parts += [f"### {_titled(name, t)}\n\n{markdown(t)}" for t in tables(result)]
+    if not found:
+        parts.append(_missing(section))
     return "\n".join(parts)
+
+
+def _titled(name: str, table: Table) -> str:
+    """A title that no other section has."""
+    said = name.replace("_", " ")
+    return f"{table.title} ({said})" if table.title else said
+
+
+def _missing(section: Section) -> str:
+    return f"Not measured: `{section.command}`.\n"
 
 
 def tables(result: dict[str, Any]) -> list[Table]:
@@ -163,14 +210,12 @@ def tables(result: dict[str, Any]) -> list[Table]:
 
 def _success(result: dict[str, Any]) -> list[Table]:
     """Of `eval/success.py`."""
-    low, high = result["wilson_95"]
-    rate = Estimate(100 * result["success_rate"], 100 * low, 100 * high)
     study = result["config"]
     said = [study["variant"], *["recovery"] * study["rollout"]["regrasp"]]
     title = f"{', '.join(said)}: success over {result['trials']} episodes, toggle error"
     rows: list[list[Any]] = [
-        ["success, % (Table 1)", rate, PAPER_SUCCESS],
-        ["success, % (Table 5, nominal)", rate, PAPER_NOMINAL],
+        ["success, % (Table 1)", rate(result), PAPER_SUCCESS],
+        ["success, % (Table 5, nominal)", rate(result), PAPER_NOMINAL],
     ]
     if toggles := result.get("toggle_error"):
         rows += [
@@ -239,20 +284,19 @@ def _origin(name: str, result: dict[str, Any]) -> str:
     return "; ".join(filter(None, said)) + "\n"
 
 
-def _worse(found: dict[str, dict]) -> str:
+def _worse(found: Found) -> str:
     """Where ours is worse than the paper or short of its aim."""
     lines = [line for result in found.values() for line in result.get("shortfalls", [])]
     for name in ("success", "success_cluttered"):
         if result := found.get(name):
-            rate = 100 * result["success_rate"]
-            if rate < PAPER_SUCCESS:
-                lines.append(f"{name}: {rate:.1f} % (paper {PAPER_SUCCESS})")
+            success = 100 * result["success_rate"]
+            if success < PAPER_SUCCESS:
+                lines.append(f"{name}: {success:.1f} % (paper {PAPER_SUCCESS})")
             toggles = result.get("toggle_error") or {}
             if (mean := toggles.get("nearest_toggle_mean", 0)) > PAPER_ERROR:
                 lines.append(f"{name}: toggle error {mean:.4f} (paper {PAPER_ERROR})")
-    heading = "## Where ours is worse, or short of its aim\n\n"
-    body = "\n".join(f"- {line}" for line in lines) or "Nowhere in what is below."
-    return heading + body + "\n"
+    body = "".join(f"- {line}\n" for line in lines)
+    return f"Worse, or short of the aim:\n\n{body}" if body else ""
 
 
 if __name__ == "__main__":

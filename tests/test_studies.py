@@ -3,6 +3,7 @@
 import dataclasses
 import json
 import math
+import re
 import subprocess
 import sys
 import time
@@ -256,10 +257,30 @@ def test_cells_are_short_and_nothing_is_a_dash():
 
 
 def test_results_are_what_the_files_say():
-    """RESULTS.md is the page that `eval/report.py` makes of the committed files."""
+    """The pages are those that `eval/report.py` makes of the committed files."""
     from report import ROOT, report
 
-    assert (ROOT / "RESULTS.md").read_text(encoding="utf-8") == report()
+    pages = report()
+    for name, text in pages.items():
+        assert (ROOT / name).read_text(encoding="utf-8") == text
+    shown = {f"docs/results/{path.name}" for path in (ROOT / "docs/results").iterdir()}
+    assert shown == {*pages} - {"RESULTS.md"}
+
+
+def test_results_are_short_and_lead_to_all_tables():
+    from report import ROOT, report
+
+    pages = report()
+    assert pages["RESULTS.md"].count("\n") <= 150
+    nav = (ROOT / "mkdocs.yml").read_text(encoding="utf-8")
+    titles = []
+    for name, text in pages.items():
+        titles += re.findall("^#+ (.*)", text, re.MULTILINE)
+        assert "****" not in text
+        if name != "RESULTS.md":
+            assert f"]({name})" in pages["RESULTS.md"]
+            assert f": {name.removeprefix('docs/')}\n" in nav
+    assert len(titles) == len(set(titles))
 
 
 def test_the_report_shows_every_figure_and_says_where_ours_is_worse(tmp_path):
@@ -275,8 +296,9 @@ def test_the_report_shows_every_figure_and_says_where_ours_is_worse(tmp_path):
         ],
     }
     (tmp_path / "expansions_plain.json").write_text(json.dumps(content))
-    page = report(tmp_path, tmp_path)
-    assert "- CVAE needs 0.50 of our expansions" in page
+    pages = report(tmp_path, tmp_path)
+    page = pages["docs/results/expansions.md"]
+    assert "- CVAE needs 0.50 of our expansions" in pages["RESULTS.md"]
     assert "1.50 (1 to 2)" in page or "1.50 (1.00 to 2.00)" in page
     assert "`python eval/expansions.py`; 2026-01-02; seeds 1:2" in page
-    assert "Not measured: `python eval/proposal_time.py`" in page
+    assert "Not measured: `python eval/proposal_time.py`" in pages["RESULTS.md"]

@@ -1,0 +1,109 @@
+"""What RESULTS.md says of each section: a few rows out of the tables of its files."""
+
+import re
+from collections.abc import Iterator
+from typing import Any
+
+from jaxplan.evaluation.tables import Cell, Estimate, Table
+
+PAPER_SUCCESS, PAPER_NOMINAL, PAPER_ERROR = 95.67, 96.0, 0.0112
+"""Success of Table 1 and of Table 5 [%], toggle error of Table 5 [rad]."""
+
+Found = dict[str, dict[str, Any]]
+"""By the name of the file: what it says."""
+
+
+def rate(result: dict[str, Any]) -> Estimate:
+    """Success [%]."""
+    return Estimate(
+        100 * result["success_rate"], *(100 * x for x in result["wilson_95"])
+    )
+
+
+def success(found: Found) -> Table:
+    """As `recovery`, beside the paper's."""
+    ours = recovery(found)
+    paper = ["paper", None, PAPER_SUCCESS, PAPER_ERROR]
+    return Table(ours.title, ours.columns, [*ours.rows, paper])
+
+
+def recovery(found: Found) -> Table:
+    """A row a file: how many episodes succeed, and how well toggles are predicted."""
+    rows: list[list[Any]] = []
+    for result in found.values():
+        study, toggles = result["config"], result.get("toggle_error") or {}
+        name = ", ".join(
+            [study["variant"], *["recovery"] * study["rollout"]["regrasp"]]
+        )
+        error = toggles.get("nearest_toggle_mean")
+        rows.append([name, result["trials"], rate(result), error])
+    columns = ["scene", "episodes", "success, %", "toggle error to the nearest [rad]"]
+    return Table("", columns, rows)
+
+
+def expansions(found: Found) -> Table:
+    """Expansions over those of ours, in the phases that a straight motion does not solve."""
+    return _side_by_side(
+        found,
+        r"(?P<column>\w+), blocked phases",
+        "normalised, failures at N_rrt",
+        "Blocked phases; failures count as the whole budget.",
+    )
+
+
+def proposals(found: Found) -> Table:
+    """Time of a proposal over that of DDIM-25."""
+    return _side_by_side(
+        found, r"Time of a proposal, (?P<column>.*)", "DDIM 25 = 1", ""
+    )
+
+
+def first_solutions(found: Found) -> Table:
+    """Time to the first solution of an episode over that of ours."""
+    return _side_by_side(
+        found,
+        r"time to first solution of an episode, (?P<column>.*)",
+        "normalised",
+        "",
+    )
+
+
+def speed(found: Found) -> Table:
+    """How many times as fast as each peer."""
+    rows = []
+    for result in found.values():
+        for part in (result.get("parts") or {"": result}).values():
+            for name, ratio in part.get("ratios", {}).items():
+                value = ratio["value"] if isinstance(ratio, dict) else ratio
+                rows.append([name, value])
+    kept = [row for row in rows if "MotionBenchMaker" in row[0]]
+    return Table("", ["ours over the other's", "times as fast"], kept)
+
+
+def _side_by_side(found: Found, title: str, column: str, note: str) -> Table:
+    """One column of several tables, a row for each name in their first columns."""
+    columns: list[str] = []
+    rows: dict[str, dict[str, Cell]] = {}
+    for head, table in _matching(found, title):
+        columns.append(head)
+        index, paper = table["columns"].index(column), table["columns"].index("paper")
+        for row in table["rows"]:
+            cells = rows.setdefault(row[0], {"paper": row[paper]})
+            cells[head] = row[index]
+    columns.append("paper")
+    body = [
+        [name, *(cells.get(head) for head in columns)] for name, cells in rows.items()
+    ]
+    return Table("", ["", *columns], body, note)
+
+
+def _matching(found: Found, title: str) -> Iterator[tuple[str, dict[str, Any]]]:
+    for name, result in found.items():
+        scene = name.rpartition("_")[2]
+        for table in result["tables"]:
+            if match := re.match(title, table["title"]):
+                several = len(found) > 1
+                yield (
+                    f"{scene}, {match['column']}" if several else match["column"],
+                    table,
+                )
