@@ -29,8 +29,8 @@ class Upper:
 
     def __init__(self, predictor: Weights, batch: int) -> None:
         self._batch = batch
-        self.features = np.zeros((batch, 0), np.float32)
-        """(B, F) of the images that were last seen; a sampler without an encoder asks for them."""
+        self._images = np.zeros((batch, 0, 0, 0), np.uint8)
+        self._features = np.zeros((batch, 0), np.float32)
 
         @jax.jit
         def network(image, q, gripper):
@@ -41,9 +41,19 @@ class Upper:
     def __call__(self, observation, episodes: list[int]) -> Targets:
         """Targets of the observed episodes: the outer loop's `predict`."""
         padded = [pad(column, episodes, self._batch) for column in observation]
-        subgoal, self.features = self.network(*padded)
+        subgoal, self._features = self.network(*padded)
+        self._images = padded[0]
         rows = (subgoal.q_toggle, subgoal.gripper_toggle, subgoal.q_goal)
         return Targets(*(np.asarray(column)[episodes] for column in rows))
+
+    def features(self, observation, episodes: list[int]) -> np.ndarray:
+        """`[B, F]` of the images of the observed episodes, for a sampler without an encoder.
+
+        Those of the last call, if it saw these images; targets may have come from elsewhere.
+        """
+        if not np.array_equal(self._images[episodes], observation.image):
+            self(observation, episodes)
+        return self._features
 
 
 class Agent:
@@ -97,8 +107,10 @@ class Agent:
             pad(column, episodes, self.batch) for column in (*observation, *targets)
         )
         targets = Targets(*aims)
+        if not self._own_encoder:
+            image = self.predict.features(observation, episodes)
         cond = Cond(
-            image=jnp.asarray(image if self._own_encoder else self.predict.features),
+            image=jnp.asarray(image),
             q=jnp.asarray(q),
             gripper=jnp.asarray(gripper),
             q_toggle=jnp.asarray(targets.q_toggle),

@@ -145,12 +145,15 @@ class TrajectoryConfig(Checked):
     """Longest gap between checked configurations where nothing proves what lies between [rad]."""
     check_rows: Count = 1024
     """Configurations of one collision call."""
-    velocity_scale: Share = 0.6
-    acceleration_scale: Share = 0.4
+    velocity_scale: Share = 1.0
+    acceleration_scale: Share = 1.0
     """Shares of the joint velocity and acceleration limits that are used."""
     control_period: Step = 0.01
     """Sampling period of the timed trajectory [s]."""
 
+
+MUG_TRAJECTORY = TrajectoryConfig(velocity_scale=0.6, acceleration_scale=0.4)
+"""What the arm does in physics: its controller follows no motion at its very limits."""
 
 PANDA_Q_MIN = (-2.8973, -1.7628, -2.8973, -3.0718, -2.8973, -0.0175, -2.8973)
 PANDA_Q_MAX = (2.8973, 1.7628, 2.8973, -0.0698, 2.8973, 3.7525, 2.8973)

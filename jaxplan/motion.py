@@ -11,7 +11,12 @@ from numpy.typing import ArrayLike
 
 from jaxplan import collision
 from jaxplan.collision import World
-from jaxplan.config import PAPER_PLANNER, PlannerConfig, TrajectoryConfig
+from jaxplan.config import (
+    MUG_TRAJECTORY,
+    PAPER_PLANNER,
+    PlannerConfig,
+    TrajectoryConfig,
+)
 from jaxplan.planning import PlanResult, Segment, make_planner
 from jaxplan.scene import Scene
 from jaxplan.scene.panda import JointLimits
@@ -54,7 +59,7 @@ class MotionPlanner:
         scene: Scene,
         limits: JointLimits,
         planner: PlannerConfig = PAPER_PLANNER,
-        trajectory: TrajectoryConfig = TrajectoryConfig(),
+        trajectory: TrajectoryConfig = MUG_TRAJECTORY,
     ) -> None:
         self.scene, self.limits = scene, limits
         self._trajectory = trajectory

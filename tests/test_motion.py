@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from jaxplan import collision
-from jaxplan.config import PlannerConfig, TrajectoryConfig
+from jaxplan.config import MUG_TRAJECTORY, PlannerConfig
 from jaxplan.motion import NEAR
 from jaxplan.planning import Status
 from jaxplan.tasks.mug.kinematics import InverseKinematics
@@ -106,7 +106,7 @@ def test_nothing_near_is_said_so(mug_planner, worlds):
 @pytest.mark.parametrize("lane", [FREE, GOAL_INSIDE, START_INSIDE])
 def test_commands_obey_the_limits(motion, mug_planner, lane):
     """A lane's speed scales velocities, and its square accelerations."""
-    config, limits = TrajectoryConfig(), mug_planner.limits
+    config, limits = MUG_TRAJECTORY, mug_planner.limits
     share = 1.0, 1.0  # the way out of a collision uses the limits whole
     if lane != START_INSIDE:
         share = config.velocity_scale, config.acceleration_scale

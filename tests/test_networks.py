@@ -13,6 +13,7 @@ from jaxplan.networks import (
     Predictor,
     SamplerNetwork,
     joints,
+    network,
     predict,
     resnet,
     unet1d,
@@ -196,3 +197,8 @@ def test_mish_equals_its_definition():
     np.testing.assert_allclose(mish(x), jax.nn.mish(x), atol=1e-5)
     slope, expected = (jax.vmap(jax.grad(f))(x) for f in (mish, jax.nn.mish))
     np.testing.assert_allclose(slope, expected, atol=1e-5)
+
+
+def test_a_config_of_no_network_is_refused():
+    with pytest.raises(TypeError, match="EncoderConfig describes no network"):
+        network(EncoderConfig())

@@ -269,6 +269,10 @@ def test_a_timed_motion_keeps_limits_and_ends_at_rest(planner, answers, scene, s
         assert planner.certify(timed.q, answer.world).valid
         low, high = np.asarray(scene.q_min), np.asarray(scene.q_max)
         assert np.all((timed.q >= low - 1e-5) & (timed.q <= high + 1e-5))
+        # The limits are used, one of them or the other.
+        used = np.abs(timed.qd).max() / (speed * VELOCITY)
+        push = np.abs(timed.qdd).max() / (speed**2 * ACCELERATION)
+        assert max(used, push) > 0.98
 
 
 def test_a_sampler_of_ones_own_guides_the_search(scene):

@@ -200,12 +200,14 @@ def test_banks_are_what_the_agent_draws():
     problems = some_problems((3, 5, 8))
     agent = Agent(predictor, sampler, 3)
     lanes = [0, 1, 2]
-    agent.predict(Observation(problems.image, problems.q, problems.gripper), lanes)
+    # Of other images: targets need not come from the predictor that the sampler looks through.
+    other = Observation(problems.image[::-1], problems.q, problems.gripper)
+    agent.predict(other, lanes)
     targets = Targets(problems.q_toggle, problems.gripper_toggle > 0.5, problems.target)
     seen = Observation(problems.image, problems.q, problems.gripper)
     expected = agent.propose(seen, targets, lanes, problems.keys())(np.array([0, 2, 1]))
     cond = Cond(
-        image=np.asarray(agent.predict.features),
+        image=np.asarray(agent.predict.features(seen, lanes)),
         q=problems.q,
         gripper=problems.gripper,
         q_toggle=problems.q_toggle,

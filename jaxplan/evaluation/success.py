@@ -9,7 +9,13 @@ from typing import Any
 import numpy as np
 
 from jaxplan.agent import Agent
-from jaxplan.config import PAPER_PLANNER, PlannerConfig, RolloutConfig, TrajectoryConfig
+from jaxplan.config import (
+    MUG_TRAJECTORY,
+    PAPER_PLANNER,
+    PlannerConfig,
+    RolloutConfig,
+    TrajectoryConfig,
+)
 from jaxplan.evaluation.memo import Memo, code_digest
 from jaxplan.evaluation.statistics import wilson
 from jaxplan.evaluation.toggle_error import ToggleError, ToggleErrors, summarize
@@ -28,7 +34,7 @@ class Success:
     """Settings of a success study."""
 
     planner: PlannerConfig = PAPER_PLANNER
-    trajectory: TrajectoryConfig = TrajectoryConfig()
+    trajectory: TrajectoryConfig = MUG_TRAJECTORY
     rollout: RolloutConfig = RolloutConfig()
     camera: str = "hand"
     batch: int = 32

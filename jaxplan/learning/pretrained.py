@@ -217,15 +217,17 @@ def _unflatten(flat: dict[str, np.ndarray]) -> dict:
 
 
 def _commit() -> str | None:
-    """The commit of the working tree that trained, or None outside a repository."""
-    command = ["git", "describe", "--always", "--dirty", "--abbrev=40"]
-    try:
+    """The commit of the working tree that trained; None where no repository has this file."""
+    here = Path(__file__)
+
+    def git(*command: str) -> str:
+        asked = ["git", "-C", str(here.parent), *command]
         return subprocess.run(
-            command,
-            cwd=Path(__file__).parent,
-            capture_output=True,
-            text=True,
-            check=True,
+            asked, capture_output=True, text=True, check=True
         ).stdout.strip()
+
+    try:
+        git("ls-files", "--error-unmatch", here.name)
+        return git("describe", "--always", "--dirty", "--abbrev=40")
     except (OSError, subprocess.CalledProcessError):
         return None

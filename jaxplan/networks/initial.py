@@ -5,18 +5,37 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 
-from jaxplan.config import CvaeConfig, GanConfig, PredictorConfig, SegmentConfig
+from jaxplan.config import (
+    CvaeConfig,
+    GanConfig,
+    PredictorConfig,
+    SamplerConfig,
+    SegmentConfig,
+)
 from jaxplan.networks.condition import Cond
 from jaxplan.networks.cvae import CvaeNetwork
 from jaxplan.networks.gan import GanNetwork
 from jaxplan.networks.predictor import Predictor
 from jaxplan.networks.sampler import SamplerNetwork
 
+NETWORKS: dict[type, Any] = {
+    PredictorConfig: Predictor,
+    CvaeConfig: CvaeNetwork,
+    GanConfig: GanNetwork,
+    SamplerConfig: SamplerNetwork,
+}
+
 
 def network(config: Any) -> Any:
-    """The Flax module that a config describes."""
-    kinds = {PredictorConfig: Predictor, CvaeConfig: CvaeNetwork, GanConfig: GanNetwork}
-    return kinds.get(type(config), SamplerNetwork)(config)
+    """The Flax module that a config describes.
+
+    Raises:
+        TypeError: It describes none.
+    """
+    for kind, module in NETWORKS.items():
+        if isinstance(config, kind):
+            return module(config)
+    raise TypeError(f"{type(config).__name__} describes no network")
 
 
 def init(
