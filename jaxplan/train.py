@@ -198,15 +198,18 @@ def _sampler_loss(
 
 
 def _read(config: TrainConfig) -> tuple[data.Shard, dict[str, Any]]:
-    """All demonstrations; their tasks, and each directory's manifest checksum."""
+    """All demonstrations; what they show, and each directory's manifest checksum."""
     shards = [data.read_demonstrations(directory) for directory in config.data]
     shard = shards[0] if len(shards) == 1 else data.concatenate(shards)
     logger.info("%d frames of %d episodes", len(shard.q), len(shard.episode_seed))
     # By name: where a machine keeps its data says nothing to anybody else.
     hashes = {Path(d).name: data.sha256(Path(d) / "manifest.json") for d in config.data}
     settings = [data.read_manifest(d)["settings"] for d in config.data]
-    tasks = sorted({each["task"] for each in settings if "task" in each})
-    return shard, {"data": hashes, "tasks": tasks}
+    shown = {
+        f"{kind}s": sorted({each[kind] for each in settings if kind in each})
+        for kind in ("task", "camera")
+    }
+    return shard, {"data": hashes, **shown}
 
 
 def _features(

@@ -84,7 +84,7 @@ def test_without_gl_it_says_what_to_install(refused, monkeypatch):
         def __init__(self, *_):
             self.predict = self.propose = None
 
-    weights = SimpleNamespace(check_task=lambda task: None)
+    weights = SimpleNamespace(check_fits=lambda task, camera: None)
     monkeypatch.setattr("jaxplan.learning.load_pair", lambda _: (weights, weights))
     monkeypatch.setattr("jaxplan.evaluation.success.Agent", Blind)
     monkeypatch.delenv("MUJOCO_GL", raising=False)

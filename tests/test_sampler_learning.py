@@ -14,6 +14,7 @@ from toy_demonstrations import demonstrations
 from jaxplan import diffusion as maths
 from jaxplan import learning, train
 from jaxplan.learning import cvae, diffusion, few_step, gan, loop, sampler
+from jaxplan.learning.pretrained import KINDS, shipped
 from jaxplan.networks import init
 
 CONFIGS = Path(__file__).parents[1] / "configs"
@@ -106,7 +107,7 @@ def test_the_door_trains_every_sampler(kind, trained):
     assert lower.config == DEBUG[kind].network
     assert lower.info["predictor_sha256"] == upper.info["sha256"]
     assert {"precision_median", "coverage_median"} <= set(lower.info["metrics"])
-    lower.check_task("a test's")
+    lower.check_fits("a test's", "hand")
 
 
 @pytest.mark.parametrize("kind", SAMPLERS)
@@ -147,12 +148,22 @@ def test_weights_of_another_network_are_refused(trained, tmp_path):
         learning.load_weights("cvae", tmp_path)
 
 
-def test_weights_of_another_task_are_refused():
-    network = learning.Weights(None, {}, {"file": "gan.npz", "tasks": ["mug"]})
-    network.check_task("mug")
+def test_weights_of_another_task_or_camera_are_refused():
+    info = {"file": "gan.npz", "tasks": ["mug"], "cameras": ["hand"]}
+    network = learning.Weights(None, {}, info)
+    network.check_fits("mug", "hand")
     with pytest.raises(learning.WeightsError, match=r"gan.npz .* mug, not mug_cl"):
-        network.check_task("mug_cluttered")
-    network._replace(info={}).check_task("mug_cluttered")  # older ones do not say
+        network.check_fits("mug_cluttered", "hand")
+    with pytest.raises(learning.WeightsError, match=r"for camera hand, not static"):
+        network.check_fits("mug", "static")
+    network._replace(info={}).check_fits("mug_cluttered", "static")  # older: unknown
+
+
+def test_shipped_weights_say_what_they_are_for():
+    for variant, task in (("plain", "mug"), ("cluttered", "mug_cluttered")):
+        for name in KINDS:
+            info = learning.load_weights(name, shipped(variant)).info
+            assert (info["tasks"], info["cameras"]) == ([task], ["hand"])
 
 
 def test_a_pupil_needs_its_teachers_predictor(trained, demos, tmp_path, capsys):

@@ -14,7 +14,7 @@ from jaxplan import data
 from jaxplan.agent import Agent
 from jaxplan.cli import run_script
 from jaxplan.learning import load_pair
-from jaxplan.learning.pretrained import DIRECTORY
+from jaxplan.learning.pretrained import shipped
 from jaxplan.motion import MotionPlanner
 from jaxplan.rollout import rollout
 from jaxplan.scene.panda import PANDA_LIMITS
@@ -28,7 +28,8 @@ class Args:
     """What to collect."""
 
     out: Path = Path("data/mug_relabelled")
-    weights: Path = DIRECTORY
+    weights: Path | None = None
+    """Directory with the networks that drive; those that are shipped for the variant where None."""
     episodes: int = 256
     first_seed: int = 50_000
     shard_size: int = 32
@@ -42,8 +43,12 @@ def main(args: Args) -> None:
         raise ValueError(
             f"nothing to do: {args.episodes} episodes, {args.shard_size} a shard"
         )
-    weights = load_pair(args.weights)
+    weights = load_pair(args.weights or shipped(args.variant))
+    task = MugTask(args.shard_size, args.camera, variant=args.variant)
+    for network in weights:
+        network.check_fits(task.name, args.camera)
     settings = dataclasses.asdict(args) | {
+        "task": task.name,
         "out": None,
         "episodes": None,
         "weights": [entry.info["sha256"] for entry in weights],
@@ -52,7 +57,6 @@ def main(args: Args) -> None:
     count = -(-args.episodes // args.shard_size)
     missing = data.missing_shards(args.out, count, settings)
     data.write_manifest(args.out, settings)
-    task = MugTask(args.shard_size, args.camera, variant=args.variant)
     planner = MotionPlanner(task.planning_scene, PANDA_LIMITS)
     agent = Agent(*weights, args.shard_size)
     bar = tqdm(missing, unit="shard")

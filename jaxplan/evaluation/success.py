@@ -69,7 +69,7 @@ class Study:
             config.batch, config.camera, config.friction, variant=config.variant
         )
         for network in weights:
-            network.check_task(self.task.name)
+            network.check_fits(self.task.name, config.camera)
         self.planner = MotionPlanner(
             self.task.planning_scene, PANDA_LIMITS, config.planner, config.trajectory
         )

@@ -56,17 +56,19 @@ class Weights(NamedTuple):
     info: dict
     """The manifest's entry."""
 
-    def check_task(self, task: str) -> None:
-        """Refuses weights that were trained on demonstrations of other tasks only.
+    def check_fits(self, task: str, camera: str) -> None:
+        """Refuses weights whose demonstrations are of other tasks or cameras only.
 
         Raises:
             WeightsError: Naming both.
         """
-        tasks = self.info.get("tasks") or [task]
-        if task not in tasks:
-            raise WeightsError(
-                f"{self.info.get('file')} was trained for {', '.join(tasks)}, not {task}"
-            )
+        for known, asked, noun in (("tasks", task, ""), ("cameras", camera, "camera ")):
+            trained = self.info.get(known) or [asked]
+            if asked not in trained:
+                raise WeightsError(
+                    f"{self.info.get('file')} was trained for {noun}{', '.join(trained)}, "
+                    f"not {asked}"
+                )
 
 
 def shipped(variant: str = "plain") -> Path:
