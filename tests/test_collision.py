@@ -17,9 +17,9 @@ from jaxplan.collision import (
     config_free,
     make_world,
     motion_free,
-    points_for,
     required_clearances,
 )
+from jaxplan.planning import points_for
 from jaxplan.scene import Scene
 from jaxplan.tasks.mug.scene import Q_HOME, build
 

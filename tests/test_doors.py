@@ -27,6 +27,7 @@ from jaxplan import (
     TrajectoryConfig,
     collision,
     config,
+    planning,
 )
 from jaxplan import make_world as world_for
 from jaxplan.blocks import SIZES
@@ -236,8 +237,8 @@ COLLISION = [
     *refused("backend ", {lambda s, w, v: collision.clearance(s, w, Q, v): ("slow", None, 3)}),
     *refused("reach ", {lambda s, w, v: collision.closest_pair(s, w, Q, v): NOT_POSITIVE[1:]}),
     *refused("samples ", {lambda s, w, v: collision.always_touching(s, v): (0, 1.5, True)}),
-    *refused("resolution ", {lambda s, w, v: collision.points_for(1.0, v): NOT_POSITIVE}),
-    *refused("length ", {lambda s, w, v: collision.points_for(v, 0.1): NOT_POSITIVE[1:]}),
+    *refused("resolution ", {lambda s, w, v: planning.points_for(1.0, v): NOT_POSITIVE}),
+    *refused("length ", {lambda s, w, v: planning.points_for(v, 0.1): NOT_POSITIVE[1:]}),
     *refused("source ", {lambda s, w, v: Scene.from_mjcf(v): (None, 3, [], b"<mujoco/>")}),
     *refused("joints ", {lambda s, w, v: Scene.from_mjcf(ARM, v): ("turn", 3, [1], {})}),
     *refused("hand ", {lambda s, w, v: Scene.from_mjcf(ARM, hand=v): (3, ["arm"], True)}),

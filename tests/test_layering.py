@@ -13,7 +13,7 @@ PACKAGE = Path(jaxplan.__file__).parent
 # Each part may import itself and what stands in an earlier line.
 LAYERS = (
     {"blocks", "interrupt", "process", "ranges"},
-    {"config", "provenance", "pretrained"},
+    {"config", "provenance"},
     {"scene", "planning", "trajectory", "diffusion", "data"},
     {"collision", "networks"},
     {"samplers", "simulation", "motion", "pose"},
@@ -22,7 +22,7 @@ LAYERS = (
     {"compiled", "goals"},
     {"reason"},
     {"planner"},
-    {"tasks", "learning", "policies"},
+    {"tasks", "learning"},
     {"rollout"},
     {"agent"},
     {"evaluation"},
@@ -97,3 +97,8 @@ def test_only_doors_print(file):
         if isinstance(node.func, ast.Name) and node.func.id == "print"
     ]
     assert file in PRINTING or not printing, f"{file} prints in lines {printing}"
+
+
+def test_every_layer_is_there():
+    there = {part_of(file) for file in FILES}
+    assert {*LAYER} == there

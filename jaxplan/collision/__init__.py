@@ -13,7 +13,6 @@ from jaxplan.collision.queries import config_free as config_free
 from jaxplan.collision.queries import motion_bound as motion_bound
 from jaxplan.collision.queries import motion_free as motion_free
 from jaxplan.collision.queries import pair_motion_bounds as pair_motion_bounds
-from jaxplan.collision.queries import points_for as points_for
 from jaxplan.collision.touching import always_touching as always_touching
 from jaxplan.collision.world import OWN_AXES as OWN_AXES
 from jaxplan.collision.world import World as World

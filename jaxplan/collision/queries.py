@@ -16,7 +16,7 @@ from jaxplan.collision.mjx_backend import least_distances
 from jaxplan.collision.narrow import Score
 from jaxplan.collision.world import OWN_AXES, World, batch_shape
 from jaxplan.process import refuse_fork
-from jaxplan.ranges import Count, NotNegative, Positive, check, numbers
+from jaxplan.ranges import Count, check, numbers
 from jaxplan.scene import Scene
 
 Backend = Literal["fast", "mjx"]
@@ -93,7 +93,7 @@ def motion_free(
     """Whether the straight motion from q0 to q1 is free.
 
     Checks `points` configurations, evenly spaced, q1 among them and q0 not: it was
-    checked when it became a node. `points_for` says how many a step length needs.
+    checked when it became a node. `planning.points_for` says how many a length needs.
 
     Args:
         scene: The scene.
@@ -115,13 +115,6 @@ def motion_free(
     leaves = zip(world, OWN_AXES, strict=True)
     along = World(*(jnp.expand_dims(leaf, -1 - own) for leaf, own in leaves))
     return jnp.all(config_free(scene, along, q, margin, backend), -1)
-
-
-def points_for(length: float, resolution: float) -> int:
-    """Configurations to check so that none of their gaps exceeds `resolution` [rad]."""
-    check("length", length, NotNegative)
-    check("resolution", resolution, Positive)
-    return max(1, math.ceil(length / resolution - 1e-9))
 
 
 def motion_bound(

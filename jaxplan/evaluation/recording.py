@@ -21,6 +21,7 @@ from jaxplan.evaluation import problems as store
 from jaxplan.evaluation.problems import Problems
 from jaxplan.learning import Weights
 from jaxplan.motion import MotionPlanner, jit
+from jaxplan.planning import points_for
 from jaxplan.rollout import Phase, Predict, Targets, rollout
 from jaxplan.scene.panda import PANDA_LIMITS
 from jaxplan.tasks.mug.demonstrate import ExpertPolicy
@@ -105,7 +106,7 @@ class Recorder:
         self._predict: Predict = self._expert
         if predictor is not None:
             self._predict = Upper(predictor, SHARD)
-        points = collision.points_for(1.0, PAPER_PLANNER.edge_resolution)
+        points = points_for(1.0, PAPER_PLANNER.edge_resolution)
         self._free = jit(
             lambda worlds, q0, q1: collision.motion_free(
                 scene, worlds, q0, q1, points, PAPER_PLANNER.margin

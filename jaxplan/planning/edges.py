@@ -11,6 +11,8 @@ from collections.abc import Callable
 import jax
 import jax.numpy as jnp
 
+from jaxplan.ranges import NotNegative, Positive, check
+
 ConfigFree = Callable[[jax.Array, jax.Array], jax.Array]
 """`(problem [R], q [R, d]) -> [R]` whether configurations are free, row r in the world of
 problem `problem[r]`."""
@@ -22,6 +24,8 @@ STAGES = 3
 
 def points_for(length: float, resolution: float) -> int:
     """Configurations to check so that none of their gaps exceeds `resolution` [rad]."""
+    check("length", length, NotNegative)
+    check("resolution", resolution, Positive)
     return max(1, math.ceil(length / resolution - 1e-3))
 
 
