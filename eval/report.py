@@ -111,7 +111,7 @@ SECTIONS = (
     Section(
         "speed",
         "Speed beside MuJoCo, OMPL, PyBullet and PyTorch",
-        ("benchmark", "motion_bench"),
+        ("benchmark", "motion_bench", "motion_bench_fetch"),
         "python eval/benchmark.py --update-baseline",
         "Not in the paper. Both sides of a ratio were measured in one run on one machine.",
         summary.speed,

@@ -69,15 +69,33 @@ def first_solutions(found: Found) -> Table:
 
 
 def speed(found: Found) -> Table:
-    """How many times as fast as each peer."""
-    rows = []
-    for result in found.values():
-        for part in (result.get("parts") or {"": result}).values():
-            for name, ratio in part.get("ratios", {}).items():
-                value = ratio["value"] if isinstance(ratio, dict) else ratio
-                rows.append([name, value])
-    kept = [row for row in rows if "MotionBenchMaker" in row[0]]
-    return Table("", ["ours over the other's", "times as fast"], kept)
+    """MotionBenchMaker: ours beside the better of OMPL's ranges."""
+    robots = {"motion_bench": "Panda", "motion_bench_fetch": "Fetch"}
+    rows: list[list[Any]] = []
+    for name in robots.keys() & found.keys():
+        by_set: dict[str, list[dict[str, Any]]] = {}
+        for row in found[name]["rows"]:
+            if row["median"] is not None:
+                by_set.setdefault(row["scene"], []).append(row)
+        for scene, (ours, *peers) in by_set.items():
+            solved = f"{ours['more']['solved']} of {ours['more']['of']}"
+            said = [f"{robots[name]}, {scene}", solved, ours["median"]]
+            if peers:
+                best = min(peers, key=lambda row: row["median"])
+                tails = [row["more"]["p95"] for row in (best, ours)]
+                times = best["median"] / ours["median"], tails[0] / tails[1]
+                said += [best["median"], *times]
+            rows.append(said + [None] * (6 - len(said)))
+    columns = [
+        "problems",
+        "solved",
+        "ours [ms]",
+        "OMPL [ms]",
+        "times as fast",
+        "at p95",
+    ]
+    note = "Medians; the last two columns are OMPL's time over ours."
+    return Table("", columns, sorted(rows, key=lambda row: row[0]), note)
 
 
 def _side_by_side(found: Found, title: str, column: str, note: str) -> Table:
