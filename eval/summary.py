@@ -95,6 +95,9 @@ def speed(found: Found) -> Table:
         "at p95",
     ]
     note = "Medians; the last two columns are OMPL's time over ours."
+    for name in sorted(robots.keys() & found.keys()):
+        if give_up := found[name].get("give_up"):
+            note += f" On the {robots[name]} OMPL gave up after {give_up:g} s."
     return Table("", columns, sorted(rows, key=lambda row: row[0]), note)
 
 
