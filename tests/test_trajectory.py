@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from toppra.algorithm import TOPPRA
 from toppra.constraint import JointAccelerationConstraint, JointVelocityConstraint
 
-from jaxplan.config import MUG_TRAJECTORY, TrajectoryConfig
+from jaxplan.config import TrajectoryConfig
 from jaxplan.scene.panda import PANDA_LIMITS
 from jaxplan.trajectory import (
     Rung,
@@ -25,7 +25,7 @@ from jaxplan.trajectory.spline import arc_length, bezier
 
 toppra.setup_logging("ERROR")
 
-CONFIG = MUG_TRAJECTORY
+CONFIG = TrajectoryConfig()
 VELOCITY = CONFIG.velocity_scale * PANDA_LIMITS.velocity
 ACCELERATION = CONFIG.acceleration_scale * PANDA_LIMITS.acceleration
 
