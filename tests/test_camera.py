@@ -1,5 +1,8 @@
 """Offscreen pictures: where points are in them, and cameras beside one another."""
 
+import subprocess
+import sys
+
 import mujoco
 import numpy as np
 
@@ -46,3 +49,26 @@ def test_a_camera_survives_the_end_of_another():
     second = Camera(model, 96, 128)
     del first
     np.testing.assert_array_equal(second.render(data, "oblique"), before)
+
+
+LEAVES = """
+import weakref
+class Thing: pass
+thing = Thing()
+weakref.finalize(thing, int)  # some library had one before
+import mujoco
+from jaxplan.simulation.camera import Camera
+model = mujoco.MjModel.from_xml_string("<mujoco><worldbody><camera name='c'/></worldbody></mujoco>")
+data = mujoco.MjData(model)
+mujoco.mj_forward(model, data)
+cameras = [Camera(model, 8, 8) for _ in range(2)]
+for camera in cameras:
+    camera.render(data, "c")
+"""
+
+
+def test_a_program_with_a_camera_ends_in_silence():
+    done = subprocess.run(
+        [sys.executable, "-c", LEAVES], capture_output=True, text=True, check=False
+    )
+    assert (done.returncode, done.stderr) == (0, "")

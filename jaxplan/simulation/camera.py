@@ -1,5 +1,6 @@
 """Offscreen rendering in MuJoCo, with one line of advice where there is no GL."""
 
+import atexit
 import ctypes.util
 import importlib
 import os
@@ -76,8 +77,9 @@ class Camera:
             raise
         except (mujoco.FatalError, AttributeError, ImportError, RuntimeError) as error:
             raise NoGLError(f"{ADVICE} ({error})") from error
-        # Without this the interpreter takes down EGL before the renderer that needs it.
-        weakref.finalize(self, _close, self._renderer)
+        # At exit before MuJoCo takes down EGL: what is registered last is called first. The
+        # finalizers' own turn may have been registered by anybody, long ago.
+        atexit.register(weakref.finalize(self, _close, self._renderer))
         options = mujoco.MjvOption()
         options.geomgroup[:] = 0
         options.geomgroup[list(groups)] = 1
