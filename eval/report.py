@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import summary
-from summary import PAPER_ERROR, PAPER_NOMINAL, PAPER_SUCCESS, Found, rate
+from summary import PAPER_ERROR, PAPER_NOMINAL, PAPER_SUCCESS, Found, rate, scene
 
 from jaxplan.cli import run_script
 from jaxplan.data import write_atomic
@@ -163,7 +163,8 @@ def report(results: Path = RESULTS, root: Path = ROOT) -> dict[str, str]:
             parts.append(_missing(section))
         elif section.summary is not None:
             parts.append(markdown(section.summary(found)))
-        parts += [_worse(found)] if _worse(found) else []
+        if worse := _worse(found):
+            parts.append(worse)
     pictures = [
         f"![{caption}](docs/figures/{name})\n\n{caption}\n"
         for name, caption in FIGURES.items()
@@ -210,12 +211,11 @@ def tables(result: dict[str, Any]) -> list[Table]:
 
 def _success(result: dict[str, Any]) -> list[Table]:
     """Of `eval/success.py`."""
-    study = result["config"]
-    said = [study["variant"], *["recovery"] * study["rollout"]["regrasp"]]
-    title = f"{', '.join(said)}: success over {result['trials']} episodes, toggle error"
+    title = f"{scene(result)}: success over {result['trials']} episodes, toggle error"
+    success = rate(result)
     rows: list[list[Any]] = [
-        ["success, % (Table 1)", rate(result), PAPER_SUCCESS],
-        ["success, % (Table 5, nominal)", rate(result), PAPER_NOMINAL],
+        ["success, % (Table 1)", success, PAPER_SUCCESS],
+        ["success, % (Table 5, nominal)", success, PAPER_NOMINAL],
     ]
     if toggles := result.get("toggle_error"):
         rows += [

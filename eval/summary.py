@@ -20,6 +20,12 @@ def rate(result: dict[str, Any]) -> Estimate:
     )
 
 
+def scene(result: dict[str, Any]) -> str:
+    """Of `eval/success.py`: the task's variant, and whether failed grasps are repeated."""
+    study = result["config"]
+    return ", ".join([study["variant"], *["recovery"] * study["rollout"]["regrasp"]])
+
+
 def success(found: Found) -> Table:
     """As `recovery`, beside the paper's."""
     ours = recovery(found)
@@ -31,12 +37,8 @@ def recovery(found: Found) -> Table:
     """A row a file: how many episodes succeed, and how well toggles are predicted."""
     rows: list[list[Any]] = []
     for result in found.values():
-        study, toggles = result["config"], result.get("toggle_error") or {}
-        name = ", ".join(
-            [study["variant"], *["recovery"] * study["rollout"]["regrasp"]]
-        )
-        error = toggles.get("nearest_toggle_mean")
-        rows.append([name, result["trials"], rate(result), error])
+        error = (result.get("toggle_error") or {}).get("nearest_toggle_mean")
+        rows.append([scene(result), result["trials"], rate(result), error])
     columns = ["scene", "episodes", "success, %", "toggle error to the nearest [rad]"]
     return Table("", columns, rows)
 

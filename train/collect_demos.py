@@ -18,7 +18,7 @@ from tqdm import tqdm
 from jaxplan import data
 from jaxplan.cli import run_script
 from jaxplan.config import DemonstrationConfig
-from jaxplan.tasks.mug.scene import Variant
+from jaxplan.tasks.mug.scene import Variant, task_name
 
 
 @dataclass(frozen=True)
@@ -93,7 +93,7 @@ def main(args: Args) -> None:
     if not 0 <= args.first_seed <= 2**31 - count * args.shard_size:
         raise ValueError(f"first_seed {args.first_seed}: seeds are 0 to {2**31 - 1}")
     settings = {
-        "task": "mug" if args.variant == "plain" else f"mug_{args.variant}",
+        "task": task_name(args.variant),
         "first_seed": args.first_seed,
         "shard_size": args.shard_size,
         "camera": args.camera,

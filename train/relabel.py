@@ -19,7 +19,7 @@ from jaxplan.motion import MotionPlanner
 from jaxplan.rollout import rollout
 from jaxplan.scene.panda import PANDA_LIMITS
 from jaxplan.tasks.mug.relabel import Relabeler
-from jaxplan.tasks.mug.scene import Variant
+from jaxplan.tasks.mug.scene import Variant, task_name
 from jaxplan.tasks.mug.task import MugTask
 
 
@@ -44,11 +44,11 @@ def main(args: Args) -> None:
             f"nothing to do: {args.episodes} episodes, {args.shard_size} a shard"
         )
     weights = load_pair(args.weights or shipped(args.variant))
-    task = MugTask(args.shard_size, args.camera, variant=args.variant)
+    name = task_name(args.variant)
     for network in weights:
-        network.check_fits(task.name, args.camera)
+        network.check_fits(name, args.camera)
     settings = dataclasses.asdict(args) | {
-        "task": task.name,
+        "task": name,
         "out": None,
         "episodes": None,
         "weights": [entry.info["sha256"] for entry in weights],
@@ -57,6 +57,7 @@ def main(args: Args) -> None:
     count = -(-args.episodes // args.shard_size)
     missing = data.missing_shards(args.out, count, settings)
     data.write_manifest(args.out, settings)
+    task = MugTask(args.shard_size, args.camera, variant=args.variant)
     planner = MotionPlanner(task.planning_scene, PANDA_LIMITS)
     agent = Agent(*weights, args.shard_size)
     bar = tqdm(missing, unit="shard")

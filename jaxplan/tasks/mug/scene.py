@@ -31,6 +31,11 @@ VISUAL = {"group": 2, "contype": 0, "conaffinity": 0}
 """Whose a geom of the surroundings is: what physics touches, planning checks, a camera sees."""
 
 
+def task_name(variant: Variant) -> str:
+    """As demonstrations and weights have it."""
+    return "mug" if variant == "plain" else f"mug_{variant}"
+
+
 def build(
     kind: Kind = "physics",
     shape: MugShape = MugShape(),

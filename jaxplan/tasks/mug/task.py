@@ -60,8 +60,7 @@ class MugTask:
         model.geom_friction *= friction
         self.model, self.shape, self.batch = model, shape, batch
         self.variant: scene.Variant = variant
-        self.name = "mug" if variant == "plain" else f"mug_{variant}"
-        """As demonstrations and weights have it."""
+        self.name = scene.task_name(variant)
         self.sim = Simulator(model, batch)
         self.closed = np.zeros(batch, bool)
         self._camera_name = camera
