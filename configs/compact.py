@@ -13,22 +13,17 @@ instead of a square, whose gradient fades before the joints are exact to a hundr
 
 from typing import Any
 
-from jaxplan.config import (
+from jaxplan.learning import LossConfig, OptimizerConfig, PredictorTraining
+from jaxplan.networks import (
     CvaeConfig,
-    CvaeTraining,
     EncoderConfig,
     FewStepConfig,
-    FewStepTraining,
     GanConfig,
-    GanTraining,
     HandCameraConfig,
-    LossConfig,
-    OptimizerConfig,
     PredictorConfig,
-    PredictorTraining,
     SamplerConfig,
-    SamplerTraining,
 )
+from jaxplan.samplers import CvaeTraining, FewStepTraining, GanTraining, SamplerTraining
 
 predictor = PredictorTraining(
     network=PredictorConfig(

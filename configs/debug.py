@@ -9,20 +9,16 @@ Seconds. Expected: the loss falls.
 
 from typing import Any
 
-from jaxplan.config import (
+from jaxplan.learning import OptimizerConfig, PredictorTraining
+from jaxplan.networks import (
     CvaeConfig,
-    CvaeTraining,
     EncoderConfig,
     FewStepConfig,
-    FewStepTraining,
     GanConfig,
-    GanTraining,
-    OptimizerConfig,
     PredictorConfig,
-    PredictorTraining,
     SamplerConfig,
-    SamplerTraining,
 )
+from jaxplan.samplers import CvaeTraining, FewStepTraining, GanTraining, SamplerTraining
 
 predictor = PredictorTraining(
     name="debug_predictor",

@@ -10,14 +10,8 @@ images. On two CPU cores (26 images/s) they would take three days each; none was
 
 from typing import Any
 
-from jaxplan.config import (
-    CvaeTraining,
-    FewStepTraining,
-    GanTraining,
-    OptimizerConfig,
-    PredictorTraining,
-    SamplerTraining,
-)
+from jaxplan.learning import OptimizerConfig, PredictorTraining
+from jaxplan.samplers import CvaeTraining, FewStepTraining, GanTraining, SamplerTraining
 
 budget: dict[str, Any] = {"steps": 50_000, "batch_size": 128}
 

@@ -19,9 +19,9 @@ from tqdm import tqdm
 
 from jaxplan.cli import run_script
 from jaxplan.config import PlannerConfig
-from jaxplan.evaluation.expansions import Counts, normalised, success
+from jaxplan.evaluation.expansions import Counts, normalised, solved_share
 from jaxplan.evaluation.methods import BACKBONES, METHODS, OURS, Backbone, planner
-from jaxplan.evaluation.study import RecordedStudy, StudyArgs
+from jaxplan.evaluation.recorded_study import RecordedStudy, StudyArgs
 from jaxplan.evaluation.tables import Estimate, Result, Table
 
 STEPS = (25, 10, 4, 1)
@@ -101,7 +101,7 @@ def study_backbone(
             [
                 [
                     name,
-                    success(counts, every),
+                    solved_share(counts, every),
                     float(counts.expansions.mean()),
                     normalised(counts, base, every),
                 ]
@@ -160,7 +160,7 @@ def budgets(
 
 def _within(counts: Counts, budget: int) -> Estimate:
     solved = counts.solved & (counts.expansions <= budget)
-    return success(counts._replace(solved=solved), np.ones(len(solved), bool))
+    return solved_share(counts._replace(solved=solved), np.ones(len(solved), bool))
 
 
 if __name__ == "__main__":

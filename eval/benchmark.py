@@ -17,14 +17,11 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
-import collision_speed
-import compile_time
 import jax
-import planning_speed
-import proposal_speed
-from gate import judge, merge
+from parts import collision_speed, compile_time, planning_speed, proposal_speed
+from parts.gate import judge, merge
+from parts.rows import Part, show
 from peers import peer_versions
-from rows import Part, show
 
 from jaxplan.cli import run_script
 from jaxplan.evaluation import versions

@@ -30,7 +30,7 @@ from jaxplan.evaluation.motion_bench import (
     read_robot,
     robot_mjcf,
 )
-from jaxplan.planner import Planner
+from jaxplan.motion import Planner
 from jaxplan.scene import Scene
 
 ROUNDING = 1e-6

@@ -13,7 +13,7 @@ from typing import Any
 
 import jax
 import numpy as np
-from queries import planner_for
+from parts.queries import planner_for
 
 from jaxplan.evaluation.motion_bench import read_problems, read_robot
 

@@ -19,9 +19,9 @@ from tqdm import tqdm
 
 from jaxplan.cli import run_script
 from jaxplan.data import TOGGLES
-from jaxplan.evaluation.expansions import Counts, normalised, success
+from jaxplan.evaluation.expansions import Counts, normalised, solved_share
 from jaxplan.evaluation.methods import BACKBONES, METHODS, OURS, Backbone, planner
-from jaxplan.evaluation.study import RecordedStudy, StudyArgs
+from jaxplan.evaluation.recorded_study import RecordedStudy, StudyArgs
 from jaxplan.evaluation.tables import Result, Table
 
 
@@ -88,7 +88,7 @@ def compare(backbone: Backbone, group: Group, counts: dict[str, Counts]) -> Tabl
         rows.append(
             [
                 method.name,
-                success(count, group.rows),
+                solved_share(count, group.rows),
                 float(count.expansions[group.rows].mean()),
                 normalised(count, own, group.rows),
                 normalised(count, own, common) if method.name in half else None,

@@ -12,16 +12,13 @@ from pathlib import Path
 
 from tqdm import tqdm
 
+from jaxplan import tasks
 from jaxplan.cli import run_script
-from jaxplan.config import DemonstrationConfig
+from jaxplan.demonstrations import ExpertAgent
+from jaxplan.demonstrations.expert import CLEAN
+from jaxplan.episodes import run_episodes
 from jaxplan.evaluation import parse_seeds, versions, wilson
 from jaxplan.evaluation.certification import Certification
-from jaxplan.evaluation.success import episode_json
-from jaxplan.rollout import Targets, rollout
-from jaxplan.tasks.mug.demonstrate import ExpertPolicy
-from jaxplan.tasks.mug.scene import Variant
-from jaxplan.tasks.mug.task import MugTask
-from jaxplan.tasks.mug.way import expert_planner
 
 
 @dataclass(frozen=True)
@@ -31,35 +28,28 @@ class Args:
     seeds: str = "0:200"
     out: Path = Path("runs/expert.json")
     batch: int = 32
-    variant: Variant = "plain"
+    task: str = tasks.DEFAULT
+    variant: str = "plain"
 
 
 def main(args: Args) -> None:
     """Runs, prints, writes JSON."""
     seeds = parse_seeds(args.seeds)
-    task = MugTask(min(args.batch, len(seeds)), variant=args.variant)
-    planner = expert_planner(task)
-    policy = ExpertPolicy(task, DemonstrationConfig(noisy_episodes=0.0))
-    certification = Certification(planner, task.planning_scene)
+    task = tasks.load(args.task, min(args.batch, len(seeds)), args.variant)
+    expert = ExpertAgent(task, CLEAN)
+    certification = Certification(expert.planner, task.planning_scene)
     records = []
     with tqdm(total=len(seeds), unit="episode") as bar:
         for first in range(0, len(seeds), task.batch):
             part = seeds[first : first + task.batch]
-            policy.reset(part)
-            records += rollout(
-                task,
-                part,
-                lambda o, e: Targets(*policy(o, e)),
-                planner,
-                listen=certification,
-            )
+            records += run_episodes(task, expert, part, listeners=[certification])
             bar.update(len(part))
     successes = sum(record.success for record in records)
     result = {
         "success_rate": successes / len(records),
         "wilson_95": wilson(successes, len(records)),
         "planning": certification.summary(),
-        "episodes": [episode_json(record) for record in records],
+        "episodes": [record.as_json() for record in records],
         "variant": args.variant,
         "versions": versions(),
     }

@@ -17,18 +17,18 @@ from typing import NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
+from pictures.sheet import INK, PAPER, Key, blank, sheet
 from PIL import Image
-from sheet import INK, PAPER, Key, blank, sheet
 
-from jaxplan.agent import Agent
+from jaxplan import tasks
+from jaxplan.base import Phase
 from jaxplan.cli import run_script
-from jaxplan.evaluation import Study, Success, parse_seeds
-from jaxplan.learning import Weights, WeightsError, load_pair, load_weights
-from jaxplan.learning.pretrained import shipped
-from jaxplan.rollout import Phase
-from jaxplan.tasks.mug import painter
-from jaxplan.tasks.mug.painter import Moment, Painter
-from jaxplan.tasks.mug.scene import Variant
+from jaxplan.evaluation import ClosedLoop, ClosedLoopConfig, parse_seeds
+from jaxplan.learned import LearnedProposals
+from jaxplan.pictures import painter
+from jaxplan.pictures.painter import Moment, Painter
+from jaxplan.pretrained import WeightsError, load_pair, load_weights, shipped
+from jaxplan.samplers import Bank
 
 SAMPLERS = {"Diffusion (ours)": "sampler", "CVAE": "cvae", "Conditional GAN": "gan"}
 TOGGLES = ("rim grasp", "release", "handle grasp", "placing")
@@ -43,8 +43,9 @@ class Args:
     seeds: str = "100000:100008"
     """Episodes to choose from: the first that succeed are drawn."""
     out: Path = Path("runs/figures")
-    variant: Variant = "plain"
-    """Of the scene."""
+    task: str = tasks.DEFAULT
+    variant: str = "plain"
+    """Of the task's scene."""
     weights: Path | None = None
     """Directory with predictor, samplers and manifest; by default the shipped ones."""
     figures: tuple[int, ...] = (2, 3, 4, 5)
@@ -56,7 +57,7 @@ class Scene(NamedTuple):
     """A phase of an episode, and what its picture needs."""
 
     phase: Phase
-    episode: int
+    lane: int
     stage: int
     """Toggles so far."""
     moment: Moment
@@ -66,21 +67,21 @@ class Scene(NamedTuple):
 class Recorder:
     """Listens to the loop and keeps every phase's picture."""
 
-    def __init__(self, study: Study, paint: Painter) -> None:
-        self._study, self._paint = study, paint
+    def __init__(self, loop: ClosedLoop, paint: Painter) -> None:
+        self._loop, self._paint = loop, paint
         self.scenes: dict[int, list[Scene]] = {}
 
     def __call__(self, phase: Phase) -> None:
         """Keeps a round."""
-        for row, e in enumerate(phase.episodes):
+        for e in phase.lanes:
             before = self.scenes.setdefault(e, [])
-            gripper = int(phase.observation.gripper[row])
+            gripper = int(phase.observation.gripper[e])
             stage = before[-1].stage if before else 0
             stage += stage % 2 != gripper
-            qpos = self._study.task.sim.data[e].qpos
+            qpos = self._loop.task.sim.data[e].qpos
             moment = self._paint.moment(phase, e, qpos)
-            if phase.draw is not None:
-                nodes = self._paint.proposed(phase, e, phase.draw, 96)
+            if (draw := phase.action.decision.draw) is not None:
+                nodes = self._paint.proposed(phase, e, draw, 96)
                 moment = moment._replace(proposals=self._paint.dots(nodes))
             before.append(Scene(phase, e, stage, moment))
 
@@ -91,16 +92,17 @@ def main(args: Args) -> None:
     seeds = seeds[:2] if args.quick else seeds
     directory = args.weights or shipped(args.variant)
     weights = load_pair(directory)
-    study = Study(weights, Success(batch=len(seeds), variant=args.variant))
-    paint = Painter(study.task, "near", scale=2)
-    recorder = Recorder(study, paint)
-    result = study.run(seeds, listen=recorder)
+    config = ClosedLoopConfig(task=args.task, variant=args.variant, batch=len(seeds))
+    loop = ClosedLoop(weights, config)
+    paint = Painter(loop.task, "near", scale=2)
+    recorder = Recorder(loop, paint)
+    result = loop.run(seeds, listen=recorder)
     solved = [e for e, row in enumerate(result["episodes"]) if row["success"]]
     if not solved:
         raise ValueError(f"none of the episodes {args.seeds} succeeded: other --seeds?")
     args.out.mkdir(parents=True, exist_ok=True)
     episodes = [recorder.scenes[e] for e in solved]
-    end = Moment(study.task.sim.data[solved[0]].qpos.copy())
+    end = Moment(loop.task.sim.data[solved[0]].qpos.copy())
     names = [str(seeds[e]) for e in solved]
     for number in args.figures:
         if number == 2:
@@ -110,7 +112,7 @@ def main(args: Args) -> None:
         elif number == 4:
             page = figure4(paint, episodes[:3], names[:3])
         elif number == 5:
-            page = figure5(paint, study, directory, weights[0], episodes[0])
+            page = figure5(paint, loop, directory, episodes[0])
         else:
             raise ValueError(f"figure {number}: 2, 3, 4 or 5")
         path = args.out / f"figure{number}.png"
@@ -162,19 +164,17 @@ def figure4(
 
 def figure5(
     paint: Painter,
-    study: Study,
+    loop: ClosedLoop,
     directory: Path,
-    predictor: Weights,
     scenes: Sequence[Scene],
 ) -> Image.Image:
-    """The phases before the two grasps, proposed for by each sampler."""
+    """The long phases before both grasps and the first release, proposed for by each sampler."""
     chosen = [_longest(scenes, 0), _longest(scenes, 1), _longest(scenes, 2)]
     rows: list[list[Image.Image]] = [[] for _ in chosen]
     captions: list[list[str]] = [[] for _ in chosen]
     for title, name in SAMPLERS.items():
         try:
-            sampler = load_weights(name, directory)
-            agent = Agent(predictor, sampler, study.config.batch)
+            bank = Bank(load_weights(name, directory))
         except WeightsError as error:
             print(f"{title}: {error}")
             for row, caption in zip(rows, captions, strict=True):
@@ -182,7 +182,9 @@ def figure5(
                 caption.append("not measured")
             continue
         for row, caption, scene in zip(rows, captions, chosen, strict=True):
-            nodes = _proposals(paint, agent, scene)
+            upper, camera = loop.learned.predict, loop.task.camera
+            propose = LearnedProposals(bank, upper, camera)
+            nodes = _proposals(paint, propose, scene)
             moment = scene.moment._replace(proposals=paint.dots(nodes), seen=None)
             way = _way(paint, scene)
             targets = [mark.position for mark in moment.targets]
@@ -223,26 +225,24 @@ def _longest(scenes: Sequence[Scene], stage: int) -> Scene:
     """The phase of a stage with the longest way to its subgoal."""
 
     def distance(scene: Scene) -> float:
-        phase, e = scene.phase, scene.episode
-        row = phase.episodes.index(e)
-        gap = phase.targets.q_goal[row] - phase.observation.q[row]
-        return float(np.linalg.norm(gap))
+        phase, e = scene.phase, scene.lane
+        q_goal = phase.action.decision.subgoal.q_goal
+        return float(np.linalg.norm(q_goal[e] - phase.observation.q[e]))
 
     return max((s for s in scenes if s.stage == stage), key=distance)
 
 
-def _proposals(paint: Painter, agent: Agent, scene: Scene) -> np.ndarray:
-    """Nodes (N, 7) that a sampler proposes for a recorded phase."""
-    phase = scene.phase
-    agent.predict(phase.observation, phase.episodes)
-    keys = jax.vmap(jax.random.key)(jnp.arange(agent.batch))
-    draw = agent.propose(phase.observation, phase.targets, phase.episodes, keys)
-    return paint.proposed(phase, scene.episode, draw, 192)
+def _proposals(paint: Painter, propose: LearnedProposals, scene: Scene) -> np.ndarray:
+    """Nodes (N, d) that a sampler proposes for a recorded phase."""
+    phase, seen = scene.phase, scene.phase.observation
+    keys = jax.vmap(jax.random.key)(jnp.arange(len(seen.q)))
+    draw = propose(seen, None, phase.action.decision.subgoal, keys)
+    return paint.proposed(phase, scene.lane, draw, 192)
 
 
 def _way(paint: Painter, scene: Scene) -> np.ndarray:
     """(N, 3) where the executed motion brings the tool centre point [m]."""
-    motion = scene.phase.motion.q[scene.episode]
+    motion = scene.phase.action.q[scene.lane]
     return np.stack([paint.tcp(q) for q in motion[::2]])
 
 

@@ -21,7 +21,7 @@ from typing import NamedTuple
 
 import mujoco
 import numpy as np
-from rows import Part, Row, compare, row_of, show
+from parts.rows import Part, Row, compare, row_of, show
 from tqdm import tqdm
 
 from jaxplan import Pose, Scene, make_world

@@ -15,9 +15,9 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
+from parts.queries import OURS, Query, ask, length, planner_for, refused, rows_of
+from parts.rows import Part, Row, compare, show
 from peers import peer_versions
-from queries import OURS, Query, ask, length, planner_for, refused, rows_of
-from rows import Part, Row, compare, show
 
 from jaxplan.cli import run_script
 from jaxplan.evaluation import versions

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import mujoco
 import numpy as np
-from queries import planner_for
+from parts.queries import planner_for
 from tqdm import tqdm
 
 from jaxplan import Pose, Scene

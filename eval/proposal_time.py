@@ -22,21 +22,25 @@ from typing import Any
 
 import jax
 import jax.numpy as jnp
+from parts.proposal_speed import torch_sides
+from parts.rows import Row
+from parts.turns import Side, compiled, take_turns
 from peers import absent, peer_versions
-from proposal_speed import torch_sides
-from rows import Row
-from turns import Side, compiled, take_turns
 
-from jaxplan.agent import BANK
 from jaxplan.cli import run_script
-from jaxplan.config import SamplerConfig
 from jaxplan.data import IMAGE_SHAPE
-from jaxplan.evaluation.study import results
+from jaxplan.evaluation.recorded_study import results
 from jaxplan.evaluation.tables import Result, Table
-from jaxplan.learning import Weights, WeightsError, load_weights
-from jaxplan.learning.pretrained import DIRECTORY
-from jaxplan.networks import Cond, init, predict
-from jaxplan.samplers import draw
+from jaxplan.networks import Cond, SamplerConfig, predict
+from jaxplan.pretrained import (
+    DIRECTORY,
+    UPPER,
+    Weights,
+    WeightsError,
+    load_weights,
+)
+from jaxplan.samplers import draw, init
+from jaxplan.samplers.bank import SIZE
 
 PART = "Table 3"
 ONE, PHASE, PAPER = "one at a time", "a phase's bank", "the paper's network"
@@ -70,7 +74,7 @@ def main(args: Args) -> None:
     """Measures, prints the table, writes JSON."""
     count = min(args.proposals, 50) if args.quick else args.proposals
     samplers, notes = shipped(args.weights)
-    upper = load_weights("predictor", args.weights)
+    upper = load_weights(UPPER, args.weights)
     features = upper.config.encoder.features * (1 + upper.config.encoder.average)
     large = SamplerConfig(encoder=None)
     network = Weights(
@@ -81,7 +85,7 @@ def main(args: Args) -> None:
         "DDIM 10": network._replace(config=replace(large, num_inference_steps=10)),
     }
     ones = [side(name, w, features, 1, 1) for name, w in samplers.items()]
-    many = [side(name, w, features, EPISODES, BANK) for name, w in samplers.items()]
+    many = [side(name, w, features, EPISODES, SIZE) for name, w in samplers.items()]
     big = [side(name, w, features, 1, 1) for name, w in unet.items()]
     if DDIM in samplers:
         ones += torch_peer(samplers[DDIM].config)
@@ -97,7 +101,7 @@ def main(args: Args) -> None:
         tables=[table(setting, rows) for setting, rows in measured.items()],
         settings={
             "proposals": count,
-            "bank": [EPISODES, BANK],
+            "bank": [EPISODES, SIZE],
             "weights": {name: w.info["sha256"] for name, w in samplers.items()},
             "configs": {name: asdict(w.config) for name, w in samplers.items()},
             "peers": peer_versions(),
@@ -137,7 +141,7 @@ def side(
 ) -> Side:
     """One call of a sampler, condition network included, for conditions of zeros.
 
-    The weights are part of the program, as in `jaxplan.agent`.
+    The weights are part of the program, as in `samplers.Bank`.
     """
     config = weights.config
     joints = jnp.zeros((problems, len(config.q_min)))

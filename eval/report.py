@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import summary
-from summary import PAPER_ERROR, PAPER_NOMINAL, PAPER_SUCCESS, Found, rate, scene
+from parts import summary
+from parts.summary import PAPER_ERROR, PAPER_NOMINAL, PAPER_SUCCESS, Found, rate, scene
 
 from jaxplan.cli import run_script
 from jaxplan.data import write_atomic

@@ -22,7 +22,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
 import numpy as np
-from robot_models import ROBOTS, Robot, find, load
+from parts.robot_models import ROBOTS, Robot, find, load
 from tqdm import tqdm
 
 from jaxplan.cli import run_script
@@ -30,7 +30,7 @@ from jaxplan.collision import World, clearance_mujoco, closest_pair, make_world
 from jaxplan.collision.touching import random_poses
 from jaxplan.config import PlannerConfig
 from jaxplan.evaluation import versions
-from jaxplan.planner import Planner
+from jaxplan.motion import Planner
 from jaxplan.scene import geom_pairs
 
 BAND = 1e-4

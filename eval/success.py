@@ -9,16 +9,16 @@ from pathlib import Path
 
 from tqdm import tqdm
 
+from jaxplan import tasks
 from jaxplan.cli import run_script
-from jaxplan.evaluation import Success, evaluate, parse_seeds
+from jaxplan.evaluation import ClosedLoopConfig, evaluate, parse_seeds
 from jaxplan.evaluation.memo import Memo
-from jaxplan.learning import load_pair
-from jaxplan.learning.pretrained import shipped
+from jaxplan.pretrained import load_pair, shipped
 
 
 @dataclass(frozen=True)
 class Args:
-    """Runs the whole method on each seed and says how often the mug ends in the box."""
+    """Runs the whole method on each seed and says how often it succeeds."""
 
     seeds: str = "100000:100100"
     """FIRST:END, END excluded. The shipped weights never saw seeds from 100000 on."""
@@ -27,12 +27,13 @@ class Args:
     """Directory with predictor, sampler and manifest; None = those shipped for the scene."""
     phases: bool = False
     """Keeps what each phase did: ten times the size."""
-    study: Success = Success()
+    study: ClosedLoopConfig = ClosedLoopConfig()
 
 
 def main(args: Args) -> None:
     """Evaluates, writes JSON, prints the rate, the reasons of failure and toggle errors."""
     seeds = parse_seeds(args.seeds)
+    tasks.check(args.study.task, args.study.variant)
     weights = load_pair(args.weights or shipped(args.study.variant))
     args.out.parent.mkdir(parents=True, exist_ok=True)
     with tqdm(total=len(seeds), unit="episode") as bar:

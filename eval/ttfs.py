@@ -15,17 +15,17 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from episode_timing import PROPOSALS, UNIFORM, Bench, episode, name_of, prices
+from parts.episode_timing import PROPOSALS, UNIFORM, Bench, episode, name_of, prices
 from tqdm import tqdm
 
-from jaxplan.agent import BANK
 from jaxplan.cli import run_script
 from jaxplan.config import PAPER_PLANNER
 from jaxplan.evaluation.memo import code_digest
+from jaxplan.evaluation.recorded_study import RecordedStudy, StudyArgs
 from jaxplan.evaluation.statistics import ratio_of_means
-from jaxplan.evaluation.study import RecordedStudy, StudyArgs
 from jaxplan.evaluation.tables import Estimate, Result, Table
 from jaxplan.provenance import versions
+from jaxplan.samplers.bank import SIZE
 
 BASE, CVAE, FEW = "ours (diffusion, DDIM-25)", "CVAE", "few-step"
 SAMPLERS: dict[str, tuple[str, dict[str, Any], tuple[float, float] | None]] = {
@@ -48,7 +48,7 @@ class Args(StudyArgs):
     p_uniform: tuple[float, ...] = (0.2, 0.6)
     method: str = "rrt_connect"
     """Or `rrt`, in which every phase asks the sampler."""
-    bank: int = BANK
+    bank: int = SIZE
     """Segments that a sampler draws at a time."""
 
 

@@ -11,11 +11,11 @@ from jaxplan.collision import World as World
 from jaxplan.collision import make_world as make_world
 from jaxplan.config import PlannerConfig as PlannerConfig
 from jaxplan.config import TrajectoryConfig as TrajectoryConfig
-from jaxplan.plan import Plan as Plan
-from jaxplan.planner import Planner as Planner
+from jaxplan.ik import Pose as Pose
+from jaxplan.motion import Plan as Plan
+from jaxplan.motion import Planner as Planner
 from jaxplan.planning import Segment as Segment
 from jaxplan.planning import Status as Status
-from jaxplan.pose import Pose as Pose
 from jaxplan.scene import Scene as Scene
 
 __version__ = "0.1.0"

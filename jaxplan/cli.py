@@ -7,7 +7,7 @@ import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal, NoReturn
+from typing import Any, NoReturn
 
 import tyro
 from tyro.conf import Positional
@@ -17,12 +17,12 @@ from jaxplan.interrupt import CLOSED, INTERRUPTED, end_on_interrupt
 
 @dataclass(frozen=True)
 class Solve:
-    """Plans and executes one mug episode with the shipped weights."""
+    """Plans and executes one episode with the shipped weights."""
 
     seed: int
-    """Of the mug's pose; training never saw seeds from 100000 on."""
-    variant: Literal["plain", "cluttered"] = "plain"
-    """Of the scene; `cluttered` has obstacles across most straight lines."""
+    """Of the episode; training never saw seeds from 100000 on."""
+    variant: str = "plain"
+    """Of the scene: `plain`, or `cluttered` with obstacles across most straight lines."""
     out: Path | None = None
     """Directory for episode.json, a video and a film strip."""
     weights: Path | None = None
@@ -160,13 +160,14 @@ def _check(command: Check) -> int:
 def _solve(command: Solve) -> int:
     _check_seed(command.seed)
     _keep_compiled()
-    from jaxplan.evaluation import Success
-    from jaxplan.learning import load_pair
-    from jaxplan.learning.pretrained import shipped
+    from jaxplan import tasks
+    from jaxplan.evaluation import ClosedLoopConfig
+    from jaxplan.pretrained import load_pair, shipped
     from jaxplan.solve import solve
 
+    config = ClosedLoopConfig(variant=command.variant)
+    tasks.check(config.task, config.variant)
     weights = load_pair(command.weights or shipped(command.variant))
-    config = Success(variant=command.variant)
     episode = solve(command.seed, weights, command.out, config)
     return 0 if episode["success"] else 1
 

@@ -9,35 +9,36 @@ from typing import Any
 
 import numpy as np
 
-from jaxplan.evaluation import Study, Success
+from jaxplan.base import Phase
+from jaxplan.evaluation import ClosedLoop, ClosedLoopConfig
 from jaxplan.learning import Weights
+from jaxplan.pictures.film import Film
 from jaxplan.planning import Status
-from jaxplan.rollout import Phase
-from jaxplan.tasks.mug.film import Film
 
 
 def solve(
     seed: int,
     weights: tuple[Weights, Weights],
     out: str | os.PathLike | None = None,
-    config: Success = Success(),
+    config: ClosedLoopConfig = ClosedLoopConfig(),
 ) -> dict[str, Any]:
-    """Plans and executes one mug episode with learned weights.
+    """Plans and executes one episode with learned weights.
 
     Args:
-        seed: Of the mug's pose.
+        seed: Of the episode.
         weights: Predictor and sampler.
         out: Directory for `episode.json`, `episode.mp4` and `phases.png`; None writes nothing.
-        config: Settings, as of the success study.
+        config: Of the closed loop.
 
     Returns:
         The episode as in `episode.json`.
     """
-    study = Study(weights, dataclasses.replace(config, batch=1))
+    print("preparing: networks and planner are compiled, once ...")
+    loop = ClosedLoop(weights, dataclasses.replace(config, batch=1))
     film, directory = None, None if out is None else Path(out)
     if directory is not None:
         directory.mkdir(parents=True, exist_ok=True)
-        film = Film(study.task)
+        film = Film(loop.task)
     clock = time.perf_counter()
 
     def listen(phase: Phase) -> None:
@@ -48,7 +49,7 @@ def solve(
             film.add_phase(phase)
         clock = time.perf_counter()
 
-    result = study.run([seed], listen=listen)
+    result = loop.run([seed], listen=listen)
     episode = result["episodes"][0]
     verdict = "success" if episode["success"] else f"failed: {episode['failure']}"
     print(
@@ -65,12 +66,17 @@ def solve(
 
 def _line(phase: Phase, period: float, seconds: float) -> str:
     """What happens in a phase of a batch of one, in a line."""
-    targets, result, motion = phase.targets, phase.motion.result, phase.motion
-    act = ("close" if targets.gripper_toggle[0] else "open") if phase.last[0] else "-"
-    distance = np.linalg.norm(targets.q_goal[0] - phase.observation.q[0])
+    decision = phase.action.decision
+    subgoal, motion = decision.subgoal, decision.motion
+    act = (
+        ("close" if subgoal.gripper_toggle[0] else "open")
+        if decision.at_toggle[0]
+        else "-"
+    )
+    distance = np.linalg.norm(subgoal.q_goal[0] - phase.observation.q[0])
     return (
         f"phase {phase.number + 1:2d}: {distance:4.2f} rad to the subgoal, "
-        f"{Status(result.status[0]).name.lower()} after {int(result.expansions[0])} "
+        f"{Status(motion.result.status[0]).name.lower()} after {int(motion.result.expansions[0])} "
         f"expansions in {motion.seconds:.2f} s, motion of {len(motion.q[0]) * period:.1f} s, "
         f"gripper {act} ({seconds:.1f} s in all)"
     )

@@ -22,41 +22,15 @@ import jax.numpy as jnp
 import numpy as np
 import tyro
 
-from jaxplan import data, learning
-from jaxplan.config import (
-    CvaeTraining,
-    FewStepTraining,
-    GanTraining,
-    PredictorTraining,
-    SamplerTraining,
-    SegmentTraining,
-    TrainConfig,
-)
-from jaxplan.learning import (
-    cvae,
-    diffusion,
-    few_step,
-    gan,
-    predictor,
-    sampler,
-    segments,
-)
+from jaxplan import data, learning, pretrained
+from jaxplan.learning import predictor, sampler, segments
+from jaxplan.learning.loop import TrainConfig
+from jaxplan.learning.predictor import PredictorTraining
+from jaxplan.learning.sampler import SegmentTraining
 from jaxplan.learning.train_state import Loss, Params
-from jaxplan.networks import init
+from jaxplan.pretrained import UPPER
+from jaxplan.samplers import FAMILIES, Family, init
 
-KINDS = {
-    "predictor": PredictorTraining,
-    "sampler": SamplerTraining,
-    "cvae": CvaeTraining,
-    "gan": GanTraining,
-    "few_step": FewStepTraining,
-}
-LOSSES = {
-    "sampler": diffusion.loss,
-    "cvae": cvae.loss,
-    "gan": gan.loss,
-}
-"""Of the samplers that learn from demonstrations alone."""
 Training = PredictorTraining | SegmentTraining
 RUNS = Path("runs")
 
@@ -65,6 +39,12 @@ logger = logging.getLogger(__name__)
 
 class UsageError(ValueError):
     """The command line or the config file is wrong."""
+
+
+def kinds() -> dict[str, type]:
+    """What can be trained, and the class of its settings."""
+    families = {family.name: family.training for family in FAMILIES.values()}
+    return {UPPER: PredictorTraining, **families}
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -76,8 +56,8 @@ def main(arguments: list[str] | None = None) -> int:
         if isinstance(config, PredictorTraining):
             path = train_predictor(config)
         else:
-            kinds = {kind: name for name, kind in KINDS.items()}
-            path = train_sampler(kinds[type(config)], config)
+            names = {kind: name for name, kind in kinds().items()}
+            path = train_sampler(FAMILIES[names[type(config)]], config)
         logger.info("weights: %s", path)
         return 0
     except learning.TrainingDiverged as error:
@@ -103,13 +83,14 @@ def parse(arguments: list[str]) -> Training:
     first.add_argument("kind", nargs="?")
     first.add_argument("--config")
     chosen, rest = first.parse_known_args(arguments)
-    if chosen.kind not in KINDS:
-        raise UsageError(f"train what? {', '.join(KINDS)} (got {chosen.kind!r})")
-    default = KINDS[chosen.kind]()
+    known = kinds()
+    if chosen.kind not in known:
+        raise UsageError(f"train what? {', '.join(known)} (got {chosen.kind!r})")
+    default = known[chosen.kind]()
     if chosen.config is not None:
         default = _read_config(chosen.config, chosen.kind)
     config, unknown = tyro.cli(
-        KINDS[chosen.kind],
+        known[chosen.kind],
         prog=f"python -m jaxplan.train {chosen.kind} [--config FILE]",
         default=default,
         args=rest,
@@ -135,23 +116,21 @@ def train_predictor(config: PredictorTraining) -> Path:
     state, metrics = learning.fit(
         config,
         RUNS / config.name,
-        _initial(
-            config, "predictor", predictor.init(config.network, key, gather(rows[:1]))
-        ),
+        _initial(config, UPPER, predictor.init(config.network, key, gather(rows[:1]))),
         partial(predictor.loss, config),
         rows,
         gather,
         predictor.validation(config.network, shard, val_rows),
     )
-    return _export(config, "predictor", state.ema_params, metrics, origin)
+    return _export(config, UPPER, state.ema_params, metrics, origin)
 
 
-def train_sampler(kind: str, config: SegmentTraining) -> Path:
+def train_sampler(family: Family, config: SegmentTraining) -> Path:
     """Trains a learned sampler and exports it; returns the weights' path."""
     upper = None
     if config.network.encoder is None:
-        upper = learning.load_weights("predictor", config.predictor)
-    loss = _sampler_loss(kind, config, upper)
+        upper = pretrained.load_weights(UPPER, config.predictor)
+    loss = _sampler_loss(family, config, upper)
     shard, origin = _read(config)
     image = shard.image if upper is None else _features(upper, shard, origin["data"])
     held = learning.held_out(shard.seed, config.val_fraction)
@@ -162,39 +141,38 @@ def train_sampler(kind: str, config: SegmentTraining) -> Path:
     state, metrics = learning.fit(
         config,
         RUNS / config.name,
-        _initial(config, kind, fresh),
+        _initial(config, family.name, fresh),
         loss,
         rows,
         partial(sampler.gather, shard, image),
-        sampler.validation(config, loss, shard, image, val_rows),
+        sampler.validation(config, family.draw, loss, shard, image, val_rows),
     )
     if upper is not None:
         origin["predictor_sha256"] = upper.info["sha256"]
-    return _export(config, kind, state.ema_params, metrics, origin)
+    return _export(config, family.name, state.ema_params, metrics, origin)
 
 
-def _sampler_loss(
-    kind: str, config: SegmentTraining, upper: learning.Weights | None
-) -> Loss:
-    """The kind's loss; the few-step sampler's has its teacher in it.
+def _sampler_loss(family: Family, config: Any, upper: learning.Weights | None) -> Loss:
+    """The family's loss, with its teacher in it if it has one.
 
     Raises:
         UsageError: The teacher sees other conditions than the pupil, or says other things.
     """
-    if not isinstance(config, FewStepTraining):
-        return partial(LOSSES[kind], config)
-    teacher = learning.load_weights("sampler", config.teacher)
+    if family.teacher is None:
+        return partial(family.loss, config)
+    teacher = pretrained.load_weights(family.teacher, config.teacher)
     if teacher.config.size != config.network.size:
         raise UsageError(
-            f"the sampler in {config.teacher} has tree_context "
+            f"the {family.teacher} in {config.teacher} has tree_context "
             f"{teacher.config.tree_context}, the pupil {config.network.tree_context}"
         )
     own = upper and upper.info["sha256"]
     if teacher.info.get("predictor_sha256") != own:
         raise UsageError(
-            f"the sampler in {config.teacher} was trained on another predictor's features"
+            f"the {family.teacher} in {config.teacher} was trained on another "
+            "predictor's features"
         )
-    return partial(few_step.loss, config, teacher)
+    return partial(family.loss, config, teacher)
 
 
 def _read(config: TrainConfig) -> tuple[data.Shard, dict[str, Any]]:
@@ -207,7 +185,7 @@ def _read(config: TrainConfig) -> tuple[data.Shard, dict[str, Any]]:
     settings = [data.read_manifest(d)["settings"] for d in config.data]
     shown = {
         f"{kind}s": sorted({each[kind] for each in settings if kind in each})
-        for kind in ("task", "camera")
+        for kind in ("task", "camera", "robot")
     }
     return shard, {"data": hashes, **shown}
 
@@ -241,7 +219,7 @@ def _initial(config: Training, kind: str, fresh: Params) -> Params:
     """The weights that `config.init` names, if it does, in place of the fresh ones."""
     if config.init is None:
         return fresh
-    weights = learning.load_weights(kind, config.init)
+    weights = pretrained.load_weights(kind, config.init)
     if weights.config != config.network:
         raise UsageError(f"{config.init} holds a {kind} with other --network settings")
     return _merged(fresh, jax.tree.map(jnp.asarray, weights.params))
@@ -268,7 +246,7 @@ def _export(
     for paths in ("data", "init", "predictor", "teacher"):
         training.pop(paths, None)  # the checksums say it without a machine's paths
     info = {"metrics": metrics, "training": training, **origin}
-    return learning.save_weights(directory, kind, params, config.network, info)
+    return pretrained.save_weights(directory, kind, params, config.network, info)
 
 
 def _read_config(path: str, kind: str) -> Training:
@@ -283,8 +261,8 @@ def _read_config(path: str, kind: str) -> Training:
         config: Any = runpy.run_path(path).get(kind)
     except (TypeError, ValueError) as error:  # no such setting, or no such value
         raise UsageError(f"{path}: {error}") from None
-    if not isinstance(config, KINDS[kind]):
-        raise UsageError(f"{path} defines no `{kind} = {KINDS[kind].__name__}(...)`")
+    if not isinstance(config, kinds()[kind]):
+        raise UsageError(f"{path} defines no `{kind} = {kinds()[kind].__name__}(...)`")
     return config
 
 

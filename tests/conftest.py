@@ -49,10 +49,10 @@ def mug_planner(mug_task):
 
     from jaxplan.config import PAPER_PLANNER
     from jaxplan.motion import MotionPlanner
-    from jaxplan.scene.panda import PANDA_LIMITS
+    from jaxplan.robots import PANDA
 
     planner = replace(PAPER_PLANNER, p_uniform=1.0)
-    return MotionPlanner(mug_task.planning_scene, PANDA_LIMITS, planner)
+    return MotionPlanner(mug_task.planning_scene, PANDA.limits, planner)
 
 
 class Demonstration(NamedTuple):
@@ -68,28 +68,16 @@ class Demonstration(NamedTuple):
 @pytest.fixture(scope="session")
 def demonstrate(mug_task, mug_planner):
     """Lets the expert drive seeds, half of them with noise, and records them."""
-    from jaxplan.config import DemonstrationConfig
+    from jaxplan.demonstrations import DemonstrationConfig, ExpertAgent, Recorder
+    from jaxplan.episodes import run_episodes
     from jaxplan.evaluation.certification import Certification
-    from jaxplan.rollout import Targets, rollout
-    from jaxplan.tasks.mug.demonstrate import ExpertPolicy, Recorder
 
     def run(seeds) -> Demonstration:
-        policy = ExpertPolicy(mug_task)
-        policy.reset(seeds)
-        recorder = Recorder(mug_task, policy, seeds, DemonstrationConfig())
+        expert = ExpertAgent(mug_task, planner=mug_planner)
+        recorder = Recorder(mug_task, expert, seeds, DemonstrationConfig())
         certification, phases = Certification(mug_planner), []
-
-        def listen(phase):
-            for listener in (phases.append, recorder, certification):
-                listener(phase)
-
-        records = rollout(
-            mug_task,
-            seeds,
-            lambda observation, episodes: Targets(*policy(observation, episodes)),
-            mug_planner,
-            listen=listen,
-        )
+        listeners = phases.append, recorder, certification
+        records = run_episodes(mug_task, expert, seeds, listeners=listeners)
         return Demonstration(seeds, records, phases, recorder, certification)
 
     return run

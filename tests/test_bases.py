@@ -4,7 +4,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from jaxplan.planner import Planner
+from jaxplan.motion import Planner
 from jaxplan.scene import Scene
 
 LINK = '<geom type="capsule" size=".03" fromto="0 0 0 .25 0 0"/>'

@@ -68,7 +68,7 @@ def test_what_is_absent_for_a_reason_is_named_and_no_regression(side, capsys):
 
 
 def test_a_quick_run_may_leave_ratios_out_but_not_be_slower():
-    from gate import judge
+    from parts.gate import judge
 
     lacking, slower = without_ratio() | {"quick": True}, result(1) | {"quick": True}
     assert judge(lacking, result()).regressions == []
@@ -79,7 +79,7 @@ def test_a_quick_run_may_leave_ratios_out_but_not_be_slower():
 
 
 def test_parts_that_were_not_run_are_not_judged():
-    from gate import judge
+    from parts.gate import judge
 
     baseline = result()
     baseline["parts"]["planning"] = copy.deepcopy(baseline["parts"]["collision"])
@@ -88,7 +88,7 @@ def test_parts_that_were_not_run_are_not_judged():
 
 
 def test_a_baseline_takes_the_parts_that_were_run_and_no_quick_run():
-    from gate import merge
+    from parts.gate import merge
 
     planning = {"parts": {"planning": {}}, "quick": False}
     assert set(merge(planning, result())["parts"]) == {"collision", "planning"}
@@ -101,7 +101,7 @@ def test_a_baseline_takes_the_parts_that_were_run_and_no_quick_run():
 def test_a_run_judges_what_it_wrote(tmp_path, monkeypatch, capsys):
     """Through the door: baseline, the same again, then a slower run."""
     import benchmark
-    from rows import Part, compare, row_of
+    from parts.rows import Part, compare, row_of
 
     def part(speed):
         rows = [
@@ -129,7 +129,7 @@ def test_a_run_judges_what_it_wrote(tmp_path, monkeypatch, capsys):
 
 
 def test_ratios_say_how_many_times_faster_we_are():
-    from rows import Row, compare, row_of
+    from parts.rows import Row, compare, row_of
 
     speeds = [row_of("p", "s", n, "1/s", [v]) for n, v in (("jaxplan", 6), ("peer", 2))]
     times = [row_of("p", "t", n, "ms", [v]) for n, v in (("jaxplan", 2), ("peer", 8))]
@@ -143,9 +143,8 @@ def test_ratios_say_how_many_times_faster_we_are():
 
 def test_absent_peers_are_rows_that_say_so(monkeypatch):
     import peers
-    import planning_speed
-    import queries
-    from rows import Part, show
+    from parts import planning_speed, queries
+    from parts.rows import Part, show
 
     monkeypatch.setattr(peers, "find_spec", lambda package: None)
     rows = queries.rows_of("planning", "a scene", {})
@@ -161,9 +160,8 @@ def test_absent_peers_are_rows_that_say_so(monkeypatch):
 
 
 def test_absent_data_are_a_row_that_says_so(tmp_path):
-    import compile_time
-    import planning_speed
-    from collision_cases import panda_cases
+    from parts import compile_time, planning_speed
+    from parts.collision_cases import panda_cases
 
     for measure in (planning_speed.measure, compile_time.measure):
         part = measure(True, tmp_path)

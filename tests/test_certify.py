@@ -14,8 +14,9 @@ from jaxplan.collision import (
     config_free,
     make_world,
 )
+from jaxplan.robots import PANDA
 from jaxplan.scene import Scene
-from jaxplan.tasks.mug.scene import Q_HOME, build
+from jaxplan.tasks.mug.scene import build
 
 SLIDER = """
 <mujoco><worldbody>
@@ -256,22 +257,22 @@ def test_what_only_our_own_distance_sees_is_refused_and_named():
 
 def test_mug_scene_names_what_meets():
     scene = Scene.from_mjcf(build("planning"))
-    low = Q_HOME + np.array([0, 1.2, 0, 0, 0, 0, 0])
-    assert not certify(scene, make_world(scene), [Q_HOME, low]).valid
+    low = PANDA.q_home + np.array([0, 1.2, 0, 0, 0, 0, 0])
+    assert not certify(scene, make_world(scene), [PANDA.q_home, low]).valid
     far = make_world(scene, [[-2, 0, 0.0475, 1, 0, 0, 0]])
-    certificate = certify(scene, far, [Q_HOME, low])
+    certificate = certify(scene, far, [PANDA.q_home, low])
     assert not certificate.valid
     assert "table_planning" in certificate.pair
     pair, depth = closest_pair(scene, far, low)
     assert "table_planning" in pair
     assert depth < -0.001
-    assert closest_pair(scene, make_world(scene), Q_HOME, reach=0.001)[0] is None
+    assert closest_pair(scene, make_world(scene), PANDA.q_home, reach=0.001)[0] is None
 
 
 def test_a_held_mug_is_carried_by_the_hand():
     scene = Scene.from_mjcf(build("planning"))
     below = make_world(scene, [[0, 0, 0.6, 1, 0, 0, 0]], held=[True])
-    (table, mug), depth = closest_pair(scene, below, Q_HOME)
+    (table, mug), depth = closest_pair(scene, below, PANDA.q_home)
     assert table == "table_planning"
     assert mug.startswith("mug_sphere")
     assert depth < 0

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from jaxplan.cli import main
-from jaxplan.learning.pretrained import DIRECTORY
+from jaxplan.pretrained import DIRECTORY
 
 ARM = Path(__file__).parents[1] / "docs" / "arm.xml"
 
@@ -78,15 +78,10 @@ def test_damaged_weights_are_named(refused, tmp_path):
 
 @pytest.mark.skipif(sys.platform != "linux", reason="elsewhere MuJoCo brings its own")
 def test_without_gl_it_says_what_to_install(refused, monkeypatch):
-    class Blind:
-        """Stands where the networks would: the camera is asked before them."""
-
-        def __init__(self, *_):
-            self.predict = self.propose = None
-
-    weights = SimpleNamespace(check_fits=lambda task, camera: None)
-    monkeypatch.setattr("jaxplan.learning.load_pair", lambda _: (weights, weights))
-    monkeypatch.setattr("jaxplan.evaluation.success.Agent", Blind)
+    # The camera is asked before the networks.
+    blind = SimpleNamespace(predict=None, propose=None)
+    monkeypatch.setattr("jaxplan.pretrained.load_pair", lambda _: (None, None))
+    monkeypatch.setattr("jaxplan.evaluation.closed_loop.learned", lambda *_: blind)
     monkeypatch.delenv("MUJOCO_GL", raising=False)
     monkeypatch.delenv("DISPLAY", raising=False)
     monkeypatch.setattr(ctypes.util, "find_library", lambda name: None)

@@ -20,8 +20,9 @@ from jaxplan.collision import (
     required_clearances,
 )
 from jaxplan.planning import points_for
+from jaxplan.robots import PANDA
 from jaxplan.scene import Scene
-from jaxplan.tasks.mug.scene import Q_HOME, build
+from jaxplan.tasks.mug.scene import build
 
 BAND = 1e-3
 
@@ -120,7 +121,7 @@ def test_a_batch_of_worlds_equals_a_loop(scene: Scene):
 
 
 def test_what_is_not_finite_is_not_free(scene: Scene):
-    world, q = make_world(scene), np.tile(Q_HOME, (4, 1))
+    world, q = make_world(scene), np.tile(PANDA.q_home, (4, 1))
     q[1, 2], q[2, 6] = np.nan, np.inf
     assert fast_free(scene, world, q).tolist() == [True, False, False, True]
     assert np.isnan(fast_clearance(scene, world, q)).tolist() == [0, 1, 1, 0]
@@ -130,13 +131,13 @@ def test_what_is_not_finite_is_not_free(scene: Scene):
 
 def test_home_is_free_and_ignored_groups_do_not_count(scene: Scene):
     world = make_world(scene)
-    assert fast_clearance(scene, world, Q_HOME) > 0.02
+    assert fast_clearance(scene, world, PANDA.q_home) > 0.02
     around = world._replace(object_pose=_mug_around_finger())
     held = around._replace(held=jnp.ones(1, bool))
-    assert fast_clearance(scene, held, Q_HOME) < 0
+    assert fast_clearance(scene, held, PANDA.q_home) < 0
     names = ["left_finger|mug", "mug|right_finger", "hand|mug"]
     allowed = held._replace(ignored=scene.ignored(names))
-    assert fast_clearance(scene, allowed, Q_HOME) > 0
+    assert fast_clearance(scene, allowed, PANDA.q_home) > 0
 
 
 def _mug_around_finger() -> jnp.ndarray:

@@ -5,8 +5,8 @@ import pytest
 
 from jaxplan.data import NO_PATH, read_shard, write_shard
 from jaxplan.data.schema import check_shard
+from jaxplan.robots import PANDA
 from jaxplan.tasks.mug.expert import Expert, Toggle
-from jaxplan.tasks.mug.scene import Q_HOME
 
 
 @pytest.fixture(scope="module")
@@ -36,7 +36,9 @@ def test_labels_are_clean_keyframes(shard, demonstration, mug_task):
     mug_task.reset(range(4), demonstration.seeds)
     expert = Expert(mug_task.model)
     for e, seed in enumerate(demonstration.seeds):
-        keyframes = expert.keyframes(mug_task.mug(e), Q_HOME, closed=False).q
+        keyframes = expert.keyframes(
+            mug_task.object_pose(e), PANDA.q_home, closed=False
+        ).q
         frames = (shard.seed == seed) & (shard.toggle == Toggle.GRASP1)
         assert np.ptp(shard.q_toggle[frames], axis=0).max() == 0
         np.testing.assert_allclose(shard.q_toggle[frames][0], keyframes[-1], atol=1e-6)

@@ -18,7 +18,7 @@ from jaxplan.collision import (
 from jaxplan.collision.kinematics import link_poses
 from jaxplan.collision.oracle import mujoco_model
 from jaxplan.collision.positions import qpos_rows
-from jaxplan.planner import Planner
+from jaxplan.motion import Planner
 from jaxplan.scene import Scene
 from jaxplan.scene.dependent import Dependent, follow, spread
 

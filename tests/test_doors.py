@@ -30,11 +30,11 @@ from jaxplan import (
     planning,
 )
 from jaxplan import make_world as world_for
-from jaxplan.blocks import SIZES
-from jaxplan.goals import Goals
-from jaxplan.questions import seeds_of
+from jaxplan.motion.blocks import SIZES
+from jaxplan.motion.checks import seeds_of
+from jaxplan.motion.goals import Goals
+from jaxplan.motion.reasons import Asked, no_path
 from jaxplan.ranges import check, kinds
-from jaxplan.reason import Asked, no_path
 
 ARM = """
 <mujoco>

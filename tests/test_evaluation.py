@@ -5,10 +5,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import binomtest
 
+from jaxplan.episodes import EpisodeRecord
 from jaxplan.evaluation import parse_seeds, versions, wilson
-from jaxplan.evaluation.success import episode_json
+from jaxplan.evaluation.closed_loop import episode_json
 from jaxplan.evaluation.toggle_error import ToggleError, summarize
-from jaxplan.rollout import EpisodeRecord
 
 
 def test_wilson_agrees_with_known_values():

@@ -9,7 +9,7 @@ from PIL import Image
 sys.path.append(str(Path(__file__).parents[1] / "eval"))
 
 from figures import legend, small
-from sheet import blank, sheet
+from pictures.sheet import blank, sheet
 
 from jaxplan.tasks.mug import painter
 

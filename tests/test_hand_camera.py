@@ -5,8 +5,9 @@ import mujoco
 import numpy as np
 import pytest
 
-from jaxplan.config import HandCameraConfig
+from jaxplan.networks import HandCameraConfig
 from jaxplan.networks.hand_camera import camera_pose, on_plane
+from jaxplan.robots import PANDA
 from jaxplan.tasks.mug import scene
 
 CONFIG = HandCameraConfig()
@@ -19,7 +20,7 @@ def data() -> mujoco.MjData:
 
 def configurations() -> np.ndarray:
     noise = np.random.default_rng(0).normal(0, 0.2, (6, 7))
-    return (scene.Q_HOME + noise).astype(np.float32)
+    return (PANDA.q_home + noise).astype(np.float32)
 
 
 def look(data: mujoco.MjData, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

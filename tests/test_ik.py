@@ -12,7 +12,6 @@ import pytest
 from jaxplan import Pose, Scene, make_world
 from jaxplan.collision import XLA_OPTIONS
 from jaxplan.collision.kinematics import frame_jacobian, frame_pose
-from jaxplan.descent import LANES
 from jaxplan.ik import (
     SAME,
     Limits,
@@ -20,6 +19,7 @@ from jaxplan.ik import (
     inverse_kinematics_batch,
     limits_of,
 )
+from jaxplan.ik.descent import LANES
 
 ARM = """
 <mujoco>

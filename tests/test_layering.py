@@ -12,19 +12,17 @@ PACKAGE = Path(jaxplan.__file__).parent
 
 # Each part may import itself and what stands in an earlier line.
 LAYERS = (
-    {"blocks", "interrupt", "process", "ranges"},
+    {"base", "interrupt", "process", "ranges"},
     {"config", "provenance"},
-    {"scene", "planning", "trajectory", "diffusion", "data"},
-    {"collision", "networks"},
-    {"samplers", "simulation", "motion", "pose"},
-    {"descent"},
-    {"ik", "plan", "questions"},
-    {"compiled", "goals"},
-    {"reason"},
-    {"planner"},
-    {"tasks", "learning"},
-    {"rollout"},
-    {"agent"},
+    {"scene", "planning", "trajectory", "diffusion"},
+    {"collision", "robots"},
+    {"data", "ik", "networks", "simulation"},
+    {"learning", "motion"},
+    {"samplers"},
+    {"pretrained", "tasks"},
+    {"episodes"},
+    {"algorithm1"},
+    {"demonstrations", "learned", "pictures"},
     {"evaluation"},
     {"commands", "solve", "train", "__init__"},
     {"cli"},
@@ -35,7 +33,7 @@ LAYER = {part: i for i, parts in enumerate(LAYERS) for part in parts}
 # Libraries that only some parts may know.
 HOMES = {
     "flax": ("networks/",),
-    "mujoco": ("scene/", "collision/", "simulation/", "tasks/"),
+    "mujoco": ("scene/", "collision/", "simulation/", "robots/", "tasks/", "pictures/"),
     "orbax": ("learning/checkpoint.py",),
 }
 OUTSIDE = {"train", "eval", "configs", "tests"}

@@ -14,25 +14,23 @@ import numpy as np
 import pytest
 from toy_demonstrations import demonstrations
 
-from jaxplan import data, learning, train
-from jaxplan.config import (
+from jaxplan import data, learning, pretrained, train
+from jaxplan.config import from_dict
+from jaxplan.learning import (
     AugmentConfig,
     LossConfig,
     OptimizerConfig,
     PredictorTraining,
-    from_dict,
-)
-from jaxplan.learning import (
     augment,
     checkpoint,
     loop,
     losses,
     predictor,
-    pretrained,
     segments,
 )
 from jaxplan.learning.train_state import ema_decay, init_state, optimizer
-from jaxplan.networks import Prediction, init
+from jaxplan.networks import Prediction
+from jaxplan.pretrained import store
 
 CONFIGS = Path(__file__).parents[1] / "configs"
 
@@ -298,28 +296,31 @@ def test_half_a_checkpoint_does_not_count(tmp_path):
 
 def test_weights_round_trip_and_damage(tmp_path):
     config = runpy.run_path(str(CONFIGS / "debug.py"))["predictor"].network
-    params = init(config, jax.random.key(0), data.IMAGE_SHAPE)
-    path = learning.save_weights(tmp_path, "predictor", params, config, {"metrics": {}})
-    weights = learning.load_weights("predictor", tmp_path)
+    frames = predictor.gather(demonstrations(), np.arange(1))
+    params = predictor.init(config, jax.random.key(0), frames)
+    path = pretrained.save_weights(
+        tmp_path, "predictor", params, config, {"metrics": {}}
+    )
+    weights = pretrained.load_weights("predictor", tmp_path)
     assert weights.config == config
     jax.tree.map(np.testing.assert_array_equal, weights.params, params)
     with pytest.raises(learning.WeightsError, match="no sampler in"):
-        learning.load_weights("sampler", tmp_path)
+        pretrained.load_weights("sampler", tmp_path)
     content = bytearray(path.read_bytes())
     content[len(content) // 2] ^= 16
     path.write_bytes(content)
     with pytest.raises(learning.WeightsError, match="damaged weights"):
-        learning.load_weights("predictor", tmp_path)
+        pretrained.load_weights("predictor", tmp_path)
     path.unlink()
     with pytest.raises(learning.WeightsError, match="missing weights"):
-        learning.load_weights("predictor", tmp_path)
-    (tmp_path / pretrained.MANIFEST).write_text("{")
+        pretrained.load_weights("predictor", tmp_path)
+    (tmp_path / store.MANIFEST).write_text("{")
     with pytest.raises(learning.WeightsError, match="damaged manifest"):
-        learning.load_weights("predictor", tmp_path)
+        pretrained.load_weights("predictor", tmp_path)
 
 
 def test_configs_survive_json():
-    for kind in train.KINDS.values():
+    for kind in train.kinds().values():
         config = kind()
         values = json.loads(json.dumps(dataclasses.asdict(config)))
         assert from_dict(kind, values) == config
@@ -343,7 +344,7 @@ def test_the_door_trains_both_networks(demos, tmp_path, monkeypatch):
     ]
     for kind, extra in (("predictor", []), ("sampler", ["--predictor", "weights"])):
         assert train.main([kind, *common, *extra]) == 0
-    upper, lower = learning.load_pair("weights")
+    upper, lower = pretrained.load_pair("weights")
     assert upper.config.hidden == 32
     assert lower.info["predictor_sha256"] == upper.info["sha256"]
     assert Path(demos).name in upper.info["data"]
@@ -408,7 +409,7 @@ def test_killed_process_resumes(demos, tmp_path):
         subprocess.run(
             command, cwd=run, env=environment, check=True, stderr=subprocess.DEVNULL
         )
-        weights = learning.load_weights(
+        weights = pretrained.load_weights(
             "predictor", run / "runs/debug_predictor/weights"
         )
         outputs.append(jax.tree.leaves(weights.params))
@@ -422,11 +423,11 @@ def test_training_starts_from_given_weights(demos, tmp_path, monkeypatch):
     config = runpy.run_path(str(CONFIGS / "debug.py"))["predictor"].network
     frames = predictor.gather(demonstrations(), np.arange(1))
     params = predictor.init(config, jax.random.key(5), frames)
-    learning.save_weights("first", "predictor", params, config, {})
+    pretrained.save_weights("first", "predictor", params, config, {})
     command = ["predictor", "--config", str(CONFIGS / "debug.py"), "--data", demos]
     still = ["--steps", "1", "--optimizer.learning-rate", "0", "--init", "first"]
     assert train.main([*command, *still, "--out", "second"]) == 0
-    second = learning.load_weights("predictor", "second").params
+    second = pretrained.load_weights("predictor", "second").params
     for a, b in zip(jax.tree.leaves(params), jax.tree.leaves(second), strict=True):
         np.testing.assert_allclose(a, b, atol=1e-6)
     other = [*still, "--network.hidden", "16", "--name", "other"]

@@ -4,22 +4,23 @@ import jax
 import numpy as np
 import pytest
 
-from jaxplan.evaluation import Study, Success
+from jaxplan.data import IMAGE_SHAPE
+from jaxplan.evaluation import ClosedLoop, ClosedLoopConfig
 from jaxplan.evaluation.memo import Memo
-from jaxplan.learning import load_pair
+from jaxplan.pretrained import load_pair
 
 SEEDS = range(100_100, 100_116)
 """Beside the seeds of the published success rate, and as unseen in training."""
 
 
 @pytest.fixture(scope="module")
-def study():
-    return Study(load_pair(), Success(batch=len(SEEDS)))
+def loop():
+    return ClosedLoop(load_pair(), ClosedLoopConfig(batch=len(SEEDS)))
 
 
 @pytest.fixture(scope="module")
-def nominal(study):
-    return study.run(SEEDS)
+def nominal(loop):
+    return loop.run(SEEDS)
 
 
 def test_the_mug_ends_in_the_box(nominal):
@@ -29,11 +30,11 @@ def test_the_mug_ends_in_the_box(nominal):
         assert episode["success"] == (episode["failure"] is None)
 
 
-def test_a_killed_study_goes_on(study, nominal, tmp_path, monkeypatch):
+def test_a_killed_study_goes_on(loop, nominal, tmp_path, monkeypatch):
     """Finished batches are read, not run again, and say what an unbroken run says."""
-    study.run(SEEDS, memo=Memo(tmp_path))
-    monkeypatch.setattr(study, "_rollout", None)
-    again = study.run(SEEDS, memo=Memo(tmp_path))
+    loop.run(SEEDS, memo=Memo(tmp_path))
+    monkeypatch.setattr(loop, "_episodes", None)
+    again = loop.run(SEEDS, memo=Memo(tmp_path))
 
     def lasting(result):
         episodes = [dict(episode) for episode in result["episodes"]]
@@ -44,21 +45,19 @@ def test_a_killed_study_goes_on(study, nominal, tmp_path, monkeypatch):
     assert lasting(again) == lasting(nominal)
 
 
-def test_images_matter(study, nominal):
+def test_images_matter(loop, nominal):
     """With pictures shuffled between episodes, toggles are far off and episodes fail.
 
     The median, since the phases of an episode that has lost its mug would rule a mean.
     """
-    shown = {}
+    shown = np.zeros((len(SEEDS), *IMAGE_SHAPE), np.uint8)
 
-    def predict(observation, episodes):
-        shown.update(zip(episodes, observation.image, strict=True))
-        other = [shown[(e + 1) % len(SEEDS)] for e in episodes]
-        return study.agent.predict(
-            observation._replace(image=np.array(other)), episodes
-        )
+    def predict(observation, lanes):
+        shown[lanes] = observation.images["hand"][lanes]
+        other = observation._replace(images={"hand": np.roll(shown, -1, axis=0)})
+        return loop.learned.predict(other, lanes)
 
-    shuffled = study.run(SEEDS, predict=predict)
+    shuffled = loop.run(SEEDS, predict=predict)
     assert shuffled["success_rate"] < 0.2
     right, wrong = (
         result["toggle_error"]["per_toggle"]["grasp1"]["median"]
@@ -67,40 +66,37 @@ def test_images_matter(study, nominal):
     assert wrong > 5 * right
 
 
-def test_nothing_privileged(study):
+def test_nothing_privileged(loop):
     """With the picture frozen, moving the mug changes no bit of what the networks say."""
     lanes = list(range(len(SEEDS)))
-    study.task.reset(lanes, SEEDS)
-    observation = study.task.observe(lanes)
+    loop.task.reset(lanes, SEEDS)
+    observation = loop.task.observe(lanes)
     keys = jax.vmap(jax.random.key)(np.arange(len(SEEDS), dtype=np.uint32))
 
     def answers():
-        targets = study.agent.predict(observation, lanes)
-        chunk = np.zeros(len(SEEDS), np.int32)
-        return [
-            *targets,
-            *study.agent.propose(observation, targets, lanes, keys)(chunk),
-        ]
+        subgoal, features = loop.learned.predict(observation, lanes)
+        draw = loop.learned.propose(observation, features, subgoal, keys)
+        return [*subgoal, *draw(np.zeros(len(SEEDS), np.int32))]
 
     before = answers()
-    study.task.reset(lanes, [seed + 50 for seed in SEEDS])
-    assert any(study.task.mug(e)[0, 3] > 0 for e in lanes)
+    loop.task.reset(lanes, [seed + 50 for seed in SEEDS])
+    assert any(loop.task.object_pose(e)[0, 3] > 0 for e in lanes)
     for first, second in zip(before, answers(), strict=True):
         np.testing.assert_array_equal(first, second)
 
 
-def test_nothing_faked(study):
+def test_nothing_faked(loop):
     """No constraint holds the mug; without friction every episode fails."""
-    assert study.task.model.neq == 0
-    friction = study.task.model.geom_friction.copy()
-    study.task.model.geom_friction[:] = 0
+    assert loop.task.model.neq == 0
+    friction = loop.task.model.geom_friction.copy()
+    loop.task.model.geom_friction[:] = 0
     try:
-        assert study.run(SEEDS)["successes"] == 0
+        assert loop.run(SEEDS)["successes"] == 0
     finally:
-        study.task.model.geom_friction[:] = friction
+        loop.task.model.geom_friction[:] = friction
 
 
-def test_nothing_recompiles(study, nominal):
+def test_nothing_recompiles(loop, nominal):
     """Planner, predictor and sampler are compiled once for a whole evaluation."""
     compiled = []
 
@@ -110,7 +106,7 @@ def test_nothing_recompiles(study, nominal):
 
     jax.monitoring.register_event_duration_secs_listener(listen)
     try:
-        study.run([seed + 1000 for seed in SEEDS])
+        loop.run([seed + 1000 for seed in SEEDS])
     finally:
         jax.monitoring.clear_event_listeners()
     assert compiled == []

@@ -5,11 +5,11 @@ import numpy as np
 import pytest
 
 from jaxplan import collision
-from jaxplan.config import MUG_TRAJECTORY, PlannerConfig
-from jaxplan.motion import NEAR
+from jaxplan.config import EXECUTED_TRAJECTORY, PlannerConfig
+from jaxplan.motion.executable import NEAR
 from jaxplan.planning import Status
-from jaxplan.tasks.mug.kinematics import InverseKinematics
-from jaxplan.tasks.mug.scene import Q_HOME
+from jaxplan.robots import PANDA
+from jaxplan.robots.kinematics import InverseKinematics
 
 SPEED = np.array([1.0, 0.5, 1.0, 1.0])
 FREE, GOAL_INSIDE, START_INSIDE, HOPELESS = range(4)
@@ -25,11 +25,11 @@ def worlds(mug_task):
 @pytest.fixture(scope="module")
 def problems(mug_task, mug_planner, worlds):
     """Starts and goals [4, 7]; the table is what some of them lie in."""
-    ik = InverseKinematics(mug_task.model)
-    _, down = ik.pose(Q_HOME)
+    ik = InverseKinematics(PANDA, mug_task.model)
+    _, down = ik.pose(PANDA.q_home)
 
     def above(x: float, y: float, z: float) -> np.ndarray:
-        return ik.solve(np.array([x, y, z]), down, Q_HOME)[0]
+        return ik.solve(np.array([x, y, z]), down, PANDA.q_home)[0]
 
     def sunk(lane: int, high: np.ndarray, low: np.ndarray) -> np.ndarray:
         """On the way from high to low, the first place that is 2 mm deep."""
@@ -40,7 +40,7 @@ def problems(mug_task, mug_planner, worlds):
 
     left, right = above(0.5, 0.3, 0.15), above(0.5, -0.25, 0.2)
     inside = sunk(GOAL_INSIDE, left, above(0.5, 0.3, -0.05))
-    start = np.stack([Q_HOME, Q_HOME, inside, Q_HOME])
+    start = np.stack([PANDA.q_home, PANDA.q_home, inside, PANDA.q_home])
     goal = np.stack([left, inside, right, above(0.5, 0.3, -0.08)])
     return start, goal
 
@@ -100,13 +100,13 @@ def test_a_goal_deep_inside_is_refused_and_named(motion, mug_planner, worlds, pr
 
 def test_nothing_near_is_said_so(mug_planner, worlds):
     free = jax.tree.map(np.copy, worlds)._replace(ignored=np.ones_like(worlds.ignored))
-    assert mug_planner.reason(free, 0, Q_HOME) == "nothing"
+    assert mug_planner.reason(free, 0, PANDA.q_home) == "nothing"
 
 
 @pytest.mark.parametrize("lane", [FREE, GOAL_INSIDE, START_INSIDE])
 def test_commands_obey_the_limits(motion, mug_planner, lane):
     """A lane's speed scales velocities, and its square accelerations."""
-    config, limits = MUG_TRAJECTORY, mug_planner.limits
+    config, limits = EXECUTED_TRAJECTORY, mug_planner.limits
     share = 1.0, 1.0  # the way out of a collision uses the limits whole
     if lane != START_INSIDE:
         share = config.velocity_scale, config.acceleration_scale

@@ -6,19 +6,21 @@ import numpy as np
 import pytest
 from jax import lax
 
-from jaxplan.config import EncoderConfig, PredictorConfig, SamplerConfig
 from jaxplan.networks import (
     Cond,
     Encoder,
+    EncoderConfig,
     Predictor,
+    PredictorConfig,
+    SamplerConfig,
     SamplerNetwork,
     joints,
-    network,
     predict,
     resnet,
     unet1d,
 )
 from jaxplan.networks.mish import mish
+from jaxplan.samplers import family_of
 
 TINY = EncoderConfig(stem="patch4", width=4, blocks=(1, 1), keypoints=4, features=8)
 
@@ -200,5 +202,5 @@ def test_mish_equals_its_definition():
 
 
 def test_a_config_of_no_network_is_refused():
-    with pytest.raises(TypeError, match="EncoderConfig describes no network"):
-        network(EncoderConfig())
+    with pytest.raises(TypeError, match="EncoderConfig describes no sampler"):
+        family_of(EncoderConfig())

@@ -6,14 +6,14 @@ import mujoco
 import numpy as np
 import pytest
 
-from jaxplan.scene.panda_visual import add_visuals
+from jaxplan.robots.panda.visual import add_visuals
 from jaxplan.scene.surface import box, lathe
 
 
 @pytest.fixture(scope="module")
 def models() -> tuple[mujoco.MjModel, mujoco.MjModel]:
     """The Panda without and with its looks."""
-    text = (resources.files("jaxplan.scene") / "panda.xml").read_text()
+    text = (resources.files("jaxplan.robots.panda") / "panda.xml").read_text()
     spec = mujoco.MjSpec.from_string(text)
     add_visuals(spec)
     return mujoco.MjModel.from_xml_string(text), spec.compile()

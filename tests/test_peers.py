@@ -70,8 +70,8 @@ def test_the_peers_layout_changes_no_verdict(robot, problems):
 @needs_data
 def test_ompl_obeys_seeds_and_its_paths_hold(robot, problems):
     pytest.importorskip("ompl")
-    from ompl_peer import RESOLUTION, OmplPlanner, solve_in_processes
     from peers import peer_model
+    from peers.ompl_peer import RESOLUTION, OmplPlanner, solve_in_processes
 
     for problem in (p for p in problems if p.set != "cage"):  # which takes a second
         model = peer_model(robot, problem.obstacles)
@@ -101,7 +101,7 @@ def test_ompl_obeys_seeds_and_its_paths_hold(robot, problems):
 def test_pybullet_agrees_with_mujoco(robot, problems):
     pytest.importorskip("pybullet")
     from peers import peer_model
-    from pybullet_peer import PybulletChecker
+    from peers.pybullet_peer import PybulletChecker
 
     for problem in problems:
         model = peer_model(robot, problem.obstacles)
@@ -156,9 +156,9 @@ def test_torch_has_our_film_mlp(tree_context):
     torch = pytest.importorskip("torch")
     import jax
     import jax.numpy as jnp
-    from torch_peer import TorchSampler
+    from peers.torch_peer import TorchSampler
 
-    from jaxplan.config import SamplerConfig
+    from jaxplan.networks import SamplerConfig
 
     config = SamplerConfig(
         denoiser="film_mlp",
@@ -192,9 +192,9 @@ def test_torch_has_our_unet():
     torch = pytest.importorskip("torch")
     import jax
     import jax.numpy as jnp
-    from torch_peer import TorchSampler
+    from peers.torch_peer import TorchSampler
 
-    from jaxplan.config import SamplerConfig
+    from jaxplan.networks import SamplerConfig
 
     config = SamplerConfig(hidden=(16, 24, 32), encoder=None)
     torch.manual_seed(0)

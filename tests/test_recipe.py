@@ -86,7 +86,7 @@ def test_the_weights_go_through_the_evaluation(weights, tmp_path):
     out = tmp_path / "success.json"
     done = run(
         sys.executable, "eval/success.py", "--seeds", "100000:100002",
-        "--weights", str(weights), "--out", str(out), "--study.rollout.max-phases", "4",
+        "--weights", str(weights), "--out", str(out), "--study.episode.max-phases", "4",
     )  # fmt: skip
     assert done.returncode == 0, done.stderr[-2000:]
     result = json.loads(out.read_text())

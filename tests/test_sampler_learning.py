@@ -12,10 +12,10 @@ import pytest
 from toy_demonstrations import demonstrations
 
 from jaxplan import diffusion as maths
-from jaxplan import learning, train
-from jaxplan.learning import cvae, diffusion, few_step, gan, loop, sampler
-from jaxplan.learning.pretrained import KINDS, shipped
-from jaxplan.networks import init
+from jaxplan import learning, pretrained, train
+from jaxplan.learning import loop, sampler
+from jaxplan.pretrained import shipped
+from jaxplan.samplers import cvae, diffusion, few_step, gan, init
 
 CONFIGS = Path(__file__).parents[1] / "configs"
 DEBUG = runpy.run_path(str(CONFIGS / "debug.py"))
@@ -103,7 +103,7 @@ def command(kind: str, demos: str) -> list[str]:
 
 @pytest.mark.parametrize("kind", SAMPLERS)
 def test_the_door_trains_every_sampler(kind, trained):
-    upper, lower = learning.load_pair(trained, kind)
+    upper, lower = pretrained.load_pair(trained, kind)
     assert lower.config == DEBUG[kind].network
     assert lower.info["predictor_sha256"] == upper.info["sha256"]
     assert {"precision_median", "coverage_median"} <= set(lower.info["metrics"])
@@ -132,44 +132,49 @@ def test_a_killed_training_ends_with_the_same_bits(
         with pytest.raises(KeyboardInterrupt):
             train.main(arguments)
     assert train.main([*arguments, "--out", str(tmp_path)]) == 0
-    whole, cut = (learning.load_weights(kind, d).params for d in (trained, tmp_path))
+    whole, cut = (pretrained.load_weights(kind, d).params for d in (trained, tmp_path))
     jax.tree.map(np.testing.assert_array_equal, whole, cut)
 
 
 def test_weights_of_another_network_are_refused(trained, tmp_path):
     """By name and shape, also where the checksum is right."""
-    params = learning.load_weights("cvae", trained).params
+    params = pretrained.load_weights("cvae", trained).params
     small = dataclasses.replace(DEBUG["cvae"].network, latent=2)
-    learning.save_weights(tmp_path, "cvae", params, small, {})
+    pretrained.save_weights(tmp_path, "cvae", params, small, {})
     with pytest.raises(
         learning.WeightsError,
         match=r"another network: .*decoder/Dense_0/kernel is \(3, 32\), .* \(2, 32\)",
     ):
-        learning.load_weights("cvae", tmp_path)
+        pretrained.load_weights("cvae", tmp_path)
 
 
-def test_weights_of_another_task_or_camera_are_refused():
+def test_weights_of_another_task_camera_or_robot_are_refused():
     info = {"file": "gan.npz", "tasks": ["mug"], "cameras": ["hand"]}
     network = learning.Weights(None, {}, info)
-    network.check_fits("mug", "hand")
+    network.check_fits("mug", "hand", "panda")
     with pytest.raises(learning.WeightsError, match=r"gan.npz .* mug, not mug_cl"):
-        network.check_fits("mug_cluttered", "hand")
+        network.check_fits("mug_cluttered", "hand", "panda")
     with pytest.raises(learning.WeightsError, match=r"for camera hand, not static"):
-        network.check_fits("mug", "static")
-    network._replace(info={}).check_fits("mug_cluttered", "static")  # older: unknown
+        network.check_fits("mug", "static", "panda")
+    other = network._replace(info=info | {"robots": ["panda"]})
+    with pytest.raises(learning.WeightsError, match=r"for robot panda, not ur5e"):
+        other.check_fits("mug", "hand", "ur5e")
+    network._replace(info={}).check_fits(
+        "mug_cluttered", "static", "x"
+    )  # older: unknown
 
 
 def test_shipped_weights_say_what_they_are_for():
     for variant, task in (("plain", "mug"), ("cluttered", "mug_cluttered")):
-        for name in KINDS:
-            info = learning.load_weights(name, shipped(variant)).info
+        for name in train.kinds():
+            info = pretrained.load_weights(name, shipped(variant)).info
             assert (info["tasks"], info["cameras"]) == ([task], ["hand"])
 
 
 def test_a_pupil_needs_its_teachers_predictor(trained, demos, tmp_path, capsys):
-    upper = learning.load_weights("predictor", trained)
+    upper = pretrained.load_weights("predictor", trained)
     other = jax.tree.map(lambda p: p + 1, upper.params)
-    learning.save_weights(tmp_path, "predictor", other, upper.config, {})
+    pretrained.save_weights(tmp_path, "predictor", other, upper.config, {})
     arguments = command("few_step", demos)
     arguments[arguments.index("--predictor") + 1] = str(tmp_path)
     arguments[arguments.index("--teacher") + 1] = str(trained)

@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 from jaxplan import samplers
-from jaxplan.config import CvaeConfig, FewStepConfig, GanConfig, SamplerConfig
-from jaxplan.networks import Cond, init
-from jaxplan.samplers import few_step
+from jaxplan.networks import Cond, CvaeConfig, FewStepConfig, GanConfig, SamplerConfig
+from jaxplan.samplers import few_step, init
 from jaxplan.samplers.diffusion import noise
 
 draw = jax.jit(samplers.draw, static_argnums=(0, 4))

@@ -13,7 +13,7 @@ from jaxplan.collision import (
     make_world,
     world_at_key,
 )
-from jaxplan.planner import Planner
+from jaxplan.motion import Planner
 from jaxplan.scene import Scene
 from jaxplan.tasks.mug.scene import build
 

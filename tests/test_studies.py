@@ -13,20 +13,20 @@ import jax
 import numpy as np
 import pytest
 
-from jaxplan.agent import Agent
+from jaxplan.base import Observation, Subgoal
 from jaxplan.config import PAPER_PLANNER
 from jaxplan.data import DataError
 from jaxplan.evaluation import problems as store
-from jaxplan.evaluation.expansions import Counts, normalised, success
+from jaxplan.evaluation.expansions import Counts, normalised, solved_share
 from jaxplan.evaluation.memo import Memo
 from jaxplan.evaluation.methods import BACKBONES, METHODS, planner
 from jaxplan.evaluation.problems import Problems
 from jaxplan.evaluation.statistics import bootstrap
 from jaxplan.evaluation.tables import Estimate, Table, cell, markdown
-from jaxplan.learning import load_pair
+from jaxplan.learned import LearnedProposals, Upper
 from jaxplan.networks import Cond
-from jaxplan.rollout import Targets
-from jaxplan.tasks.mug.task import Observation
+from jaxplan.pretrained import load_pair
+from jaxplan.samplers import Bank
 
 sys.path.append(str(Path(__file__).parents[1] / "eval"))
 EVERY = np.ones(4, bool)
@@ -82,10 +82,10 @@ def test_whole_trials_count_only_where_all_phases_are_solved():
 
 
 def test_success_is_in_percent():
-    solved = success(counts([1] * 4, [True, True, True, False]), EVERY)
+    solved = solved_share(counts([1] * 4, [True, True, True, False]), EVERY)
     assert solved.value == 75
     assert solved.low < 75 < solved.high
-    assert math.isnan(success(counts([1] * 4), ~EVERY).value)
+    assert math.isnan(solved_share(counts([1] * 4), ~EVERY).value)
 
 
 def test_the_bootstrap_covers_a_known_mean():
@@ -194,27 +194,25 @@ def test_keys_are_those_of_the_outer_loop():
 
 def test_banks_are_what_the_agent_draws():
     """For each problem, in any order and company, the segments that an episode would get."""
-    from jaxplan.evaluation.searches import Banks
+    from jaxplan.evaluation.searches import KeptBanks
 
     predictor, sampler = load_pair()
     problems = some_problems((3, 5, 8))
-    agent = Agent(predictor, sampler, 3)
-    lanes = [0, 1, 2]
-    # Of other images: targets need not come from the predictor that the sampler looks through.
-    other = Observation(problems.image[::-1], problems.q, problems.gripper)
-    agent.predict(other, lanes)
-    targets = Targets(problems.q_toggle, problems.gripper_toggle > 0.5, problems.target)
-    seen = Observation(problems.image, problems.q, problems.gripper)
-    expected = agent.propose(seen, targets, lanes, problems.keys())(np.array([0, 2, 1]))
+    upper, bank = Upper(predictor, "hand"), Bank(sampler)
+    propose = LearnedProposals(bank, upper, "hand")
+    targets = Subgoal(problems.q_toggle, problems.gripper_toggle > 0.5, problems.target)
+    seen = Observation({"hand": problems.image}, problems.q, problems.gripper)
+    # None: targets need not come from the predictor that the sampler looks through.
+    expected = propose(seen, None, targets, problems.keys())(np.array([0, 2, 1]))
     cond = Cond(
-        image=np.asarray(agent.predict.features(seen, lanes)),
+        image=np.asarray(upper.features(seen)),
         q=problems.q,
         gripper=problems.gripper,
         q_toggle=problems.q_toggle,
         gripper_toggle=targets.gripper_toggle,
         q_goal=problems.target,
     )
-    banks = Banks(sampler, cond, problems.keys())
+    banks = KeptBanks(bank, cond, problems.keys())
     banks.of(np.array([1, 2]))(np.array([0, 0]))
     found = banks.of(np.array([2, 0, 1]))(np.array([1, 0, 2]))
     for name in ("direction", "length"):

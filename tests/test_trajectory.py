@@ -10,7 +10,7 @@ from toppra.algorithm import TOPPRA
 from toppra.constraint import JointAccelerationConstraint, JointVelocityConstraint
 
 from jaxplan.config import TrajectoryConfig
-from jaxplan.scene.panda import PANDA_LIMITS
+from jaxplan.robots import PANDA
 from jaxplan.trajectory import (
     Rung,
     Validation,
@@ -26,8 +26,8 @@ from jaxplan.trajectory.spline import arc_length, bezier
 toppra.setup_logging("ERROR")
 
 CONFIG = TrajectoryConfig()
-VELOCITY = CONFIG.velocity_scale * PANDA_LIMITS.velocity
-ACCELERATION = CONFIG.acceleration_scale * PANDA_LIMITS.acceleration
+VELOCITY = CONFIG.velocity_scale * PANDA.limits.velocity
+ACCELERATION = CONFIG.acceleration_scale * PANDA.limits.acceleration
 
 
 def everywhere(problem, q):
@@ -50,7 +50,7 @@ def zigzag(seed, waypoints=8, d=7, step=0.3):
     """A random walk inside the Panda's limits `[waypoints, d]`."""
     moves = np.random.default_rng(seed).normal(size=(waypoints - 1, d))
     moves *= step / np.linalg.norm(moves, axis=1, keepdims=True)
-    middle = (PANDA_LIMITS.q_min + PANDA_LIMITS.q_max)[:d] / 2
+    middle = (PANDA.limits.q_min + PANDA.limits.q_max)[:d] / 2
     return middle + np.concatenate([np.zeros((1, d)), np.cumsum(moves, axis=0)])
 
 
@@ -73,8 +73,8 @@ def make(paths, config_free=everywhere, config=CONFIG, seeds=None, d=7, **more):
         length,
         jax.vmap(jax.random.key)(seeds),
         config_free,
-        PANDA_LIMITS.velocity[:d],
-        PANDA_LIMITS.acceleration[:d],
+        PANDA.limits.velocity[:d],
+        PANDA.limits.acceleration[:d],
         config,
         **more,
     )

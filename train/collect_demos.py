@@ -15,10 +15,10 @@ from pathlib import Path
 from card import write_card
 from tqdm import tqdm
 
-from jaxplan import data
+from jaxplan import data, tasks
 from jaxplan.cli import run_script
-from jaxplan.config import DemonstrationConfig
-from jaxplan.tasks.mug.scene import Variant, task_name
+from jaxplan.demonstrations import DemonstrationConfig, ExpertAgent, Recorder
+from jaxplan.episodes import run_episodes
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,8 @@ class Args:
     shard_size: int = 32
     """Episodes a shard; one batch in lockstep."""
     camera: str = "hand"
-    variant: Variant = "plain"
+    task: str = tasks.DEFAULT
+    variant: str = "plain"
     workers: int = field(default_factory=lambda: os.cpu_count() or 1)
     """Processes, each making one shard at a time. The bytes do not depend on it."""
     demonstration: DemonstrationConfig = DemonstrationConfig()
@@ -41,32 +42,17 @@ class Collector:
     """Makes shards in a process of its own."""
 
     def __init__(self, args: Args) -> None:
-        from jaxplan.tasks.mug.demonstrate import ExpertPolicy
-        from jaxplan.tasks.mug.task import MugTask
-        from jaxplan.tasks.mug.way import expert_planner
-
         self._args = args
-        self._task = MugTask(args.shard_size, args.camera, variant=args.variant)
-        self._planner = expert_planner(self._task)
-        self._policy = ExpertPolicy(self._task, args.demonstration)
+        self._task = tasks.load(args.task, args.shard_size, args.variant, args.camera)
+        self._expert = ExpertAgent(self._task, args.demonstration)
 
     def shard(self, index: int) -> tuple[int, int]:
         """Makes and writes shard `index`; returns how many episodes succeeded, and of how many."""
-        from jaxplan.rollout import Targets, rollout
-        from jaxplan.tasks.mug.demonstrate import Recorder
-
-        args, policy = self._args, self._policy
+        args, task, expert = self._args, self._task, self._expert
         first = args.first_seed + index * args.shard_size
         seeds = range(first, first + args.shard_size)
-        policy.reset(seeds)
-        recorder = Recorder(self._task, policy, seeds, args.demonstration)
-        records = rollout(
-            self._task,
-            seeds,
-            lambda observation, episodes: Targets(*policy(observation, episodes)),
-            self._planner,
-            listen=recorder,
-        )
+        recorder = Recorder(task, expert, seeds, args.demonstration)
+        records = run_episodes(task, expert, seeds, listeners=[recorder])
         data.write_shard(data.shard_path(args.out, index), recorder.shard(records))
         return sum(record.success for record in records), len(records)
 
@@ -93,7 +79,8 @@ def main(args: Args) -> None:
     if not 0 <= args.first_seed <= 2**31 - count * args.shard_size:
         raise ValueError(f"first_seed {args.first_seed}: seeds are 0 to {2**31 - 1}")
     settings = {
-        "task": task_name(args.variant),
+        "task": tasks.check(args.task, args.variant),
+        "robot": tasks.TASKS[args.task].robot,
         "first_seed": args.first_seed,
         "shard_size": args.shard_size,
         "camera": args.camera,

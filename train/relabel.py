@@ -10,17 +10,14 @@ from pathlib import Path
 
 from tqdm import tqdm
 
-from jaxplan import data
-from jaxplan.agent import Agent
+from jaxplan import data, tasks
+from jaxplan.algorithm1 import Algorithm1
 from jaxplan.cli import run_script
-from jaxplan.learning import load_pair
-from jaxplan.learning.pretrained import shipped
+from jaxplan.demonstrations import Relabeler
+from jaxplan.episodes import run_episodes
+from jaxplan.learned import learned
 from jaxplan.motion import MotionPlanner
-from jaxplan.rollout import rollout
-from jaxplan.scene.panda import PANDA_LIMITS
-from jaxplan.tasks.mug.relabel import Relabeler
-from jaxplan.tasks.mug.scene import Variant, task_name
-from jaxplan.tasks.mug.task import MugTask
+from jaxplan.pretrained import load_pair, shipped
 
 
 @dataclass(frozen=True)
@@ -34,7 +31,8 @@ class Args:
     first_seed: int = 50_000
     shard_size: int = 32
     camera: str = "hand"
-    variant: Variant = "plain"
+    task: str = tasks.DEFAULT
+    variant: str = "plain"
 
 
 def main(args: Args) -> None:
@@ -43,12 +41,13 @@ def main(args: Args) -> None:
         raise ValueError(
             f"nothing to do: {args.episodes} episodes, {args.shard_size} a shard"
         )
+    name, robot = tasks.check(args.task, args.variant), tasks.TASKS[args.task].robot
     weights = load_pair(args.weights or shipped(args.variant))
-    name = task_name(args.variant)
     for network in weights:
-        network.check_fits(name, args.camera)
+        network.check_fits(name, args.camera, robot)
     settings = dataclasses.asdict(args) | {
         "task": name,
+        "robot": robot,
         "out": None,
         "episodes": None,
         "weights": [entry.info["sha256"] for entry in weights],
@@ -57,17 +56,15 @@ def main(args: Args) -> None:
     count = -(-args.episodes // args.shard_size)
     missing = data.missing_shards(args.out, count, settings)
     data.write_manifest(args.out, settings)
-    task = MugTask(args.shard_size, args.camera, variant=args.variant)
-    planner = MotionPlanner(task.planning_scene, PANDA_LIMITS)
-    agent = Agent(*weights, args.shard_size)
+    task = tasks.load(args.task, args.shard_size, args.variant, args.camera)
+    planner = MotionPlanner(task.planning_scene, task.robot.limits)
+    agent = Algorithm1(task, planner, *learned(task, weights))
     bar = tqdm(missing, unit="shard")
     for index in bar:
         first = args.first_seed + index * args.shard_size
         seeds = range(first, first + args.shard_size)
         relabeler = Relabeler(task, seeds)
-        records = rollout(
-            task, seeds, agent.predict, planner, agent.propose, listen=relabeler
-        )
+        records = run_episodes(task, agent, seeds, listeners=[relabeler])
         data.write_shard(data.shard_path(args.out, index), relabeler.shard(records))
         bar.set_postfix_str(
             f"{sum(r.success for r in records)}/{len(records)} succeeded"

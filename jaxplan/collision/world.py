@@ -62,7 +62,7 @@ def make_world(
         object_pose: `[..., n_objects, 7]`, see `World`.
         held: `[..., n_objects]` bool; none by default.
         passive: `[..., n_passive]` [rad or m].
-        ignored: Pairs of bodies that may touch, "hand|mug" or ("hand", "mug").
+        ignored: Pairs of bodies that may touch, "hand|cup" or ("hand", "cup").
         obstacles: What fills the scene's slots, at most as many of a kind as there are.
 
     Raises:

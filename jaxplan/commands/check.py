@@ -15,7 +15,7 @@ from jaxplan.commands.model import (
     read_scene,
     world_at,
 )
-from jaxplan.reason import with_unit
+from jaxplan.motion.reasons import with_unit
 from jaxplan.scene import Scene
 from jaxplan.scene.contacts import kind_of
 

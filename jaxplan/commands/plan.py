@@ -10,10 +10,9 @@ import numpy as np
 from jaxplan.collision import Certificate
 from jaxplan.commands.model import Pose, read_pose, read_scene, with_joints, world_at
 from jaxplan.config import PlannerConfig
-from jaxplan.plan import Plan, Timed
-from jaxplan.planner import Planner
+from jaxplan.motion import Plan, Planner, Timed
+from jaxplan.motion.reasons import joint_distance
 from jaxplan.provenance import versions
-from jaxplan.reason import joint_distance
 from jaxplan.scene import Scene
 from jaxplan.simulation.camera import require_gl
 from jaxplan.simulation.video import FPS, film_motion

@@ -4,7 +4,6 @@ from jaxplan.data.files import sha256 as sha256
 from jaxplan.data.files import write_atomic as write_atomic
 from jaxplan.data.files import write_npz as write_npz
 from jaxplan.data.schema import IMAGE_SHAPE as IMAGE_SHAPE
-from jaxplan.data.schema import JOINTS as JOINTS
 from jaxplan.data.schema import NO_PATH as NO_PATH
 from jaxplan.data.schema import PATH_POINTS as PATH_POINTS
 from jaxplan.data.schema import TOGGLES as TOGGLES

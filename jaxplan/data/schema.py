@@ -1,11 +1,12 @@
 """What a demonstration shard holds, and the checks that every shard passes."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-IMAGE_SHAPE = (88, 136, 3)
-JOINTS = 7
+from jaxplan.robots.panda.mount import MOUNT
+
+IMAGE_SHAPE = (MOUNT.height, MOUNT.width, 3)
 PATH_POINTS = 64
 NO_PATH = -1
 TOGGLES = ("grasp1", "release1", "grasp2", "release2")
@@ -25,15 +26,15 @@ class Shard(NamedTuple):
     image: np.ndarray
     """u8 [F, 88, 136, 3], RGB."""
     q: np.ndarray
-    """f32 [F, 7] [rad]."""
+    """f32 [F, d] [rad]."""
     gripper: np.ndarray
     """u8 [F]: 0 open, 1 closed."""
     q_toggle: np.ndarray
-    """f32 [F, 7], where the gripper toggles next [rad]."""
+    """f32 [F, d], where the gripper toggles next [rad]."""
     gripper_toggle: np.ndarray
     """u8 [F], the gripper's mode after that toggle: 0 open, 1 closed."""
     q_goal: np.ndarray
-    """f32 [F, 7], the phase's subgoal [rad]."""
+    """f32 [F, d], the phase's subgoal [rad]."""
     toggle: np.ndarray
     """i8 [F], index into `TOGGLES` of the toggle that comes next."""
     seed: np.ndarray
@@ -43,7 +44,7 @@ class Shard(NamedTuple):
     arc: np.ndarray
     """f32 [F], arc position of the frame on that path [rad]."""
     path_q: np.ndarray
-    """f32 [P, 64, 7], points uniform in arc length, phase start to q_goal [rad]."""
+    """f32 [P, 64, d], points uniform in arc length, phase start to q_goal [rad]."""
     path_length: np.ndarray
     """f32 [P], arc length [rad]."""
     episode_seed: np.ndarray
@@ -54,39 +55,47 @@ class Shard(NamedTuple):
     """str [E], why the episode failed; empty = it did not."""
 
 
-_ROWS = {
+_ROWS: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "image": (np.uint8, IMAGE_SHAPE),
-    "q": (np.float32, (JOINTS,)),
+    "q": (np.float32, ("d",)),
     "gripper": (np.uint8, ()),
-    "q_toggle": (np.float32, (JOINTS,)),
+    "q_toggle": (np.float32, ("d",)),
     "gripper_toggle": (np.uint8, ()),
-    "q_goal": (np.float32, (JOINTS,)),
+    "q_goal": (np.float32, ("d",)),
     "toggle": (np.int8, ()),
     "seed": (np.int32, ()),
     "path": (np.int32, ()),
     "arc": (np.float32, ()),
-    "path_q": (np.float32, (PATH_POINTS, JOINTS)),
+    "path_q": (np.float32, (PATH_POINTS, "d")),
     "path_length": (np.float32, ()),
     "episode_seed": (np.int32, ()),
     "episode_success": (np.bool_, ()),
     "episode_failure": (np.str_, ()),
 }
+"""Types and shapes of rows; d joints."""
 _TABLES = (Shard._fields[:10], Shard._fields[10:12], Shard._fields[12:])
 
 
 def as_shard(**columns: np.ndarray | list) -> Shard:
     """Casts columns to the schema's types, fills the empty ones' shapes, and checks."""
+    joints = np.shape(columns["path_q"])[-1]
     cast = {
-        name: np.asarray(columns[name], dtype).reshape(-1, *row)
-        for name, (dtype, row) in _ROWS.items()
+        name: np.asarray(columns[name], dtype).reshape(-1, *_row(name, joints))
+        for name, (dtype, _) in _ROWS.items()
     }
     return check_shard(Shard(**cast))
 
 
+def _row(name: str, joints: int) -> tuple[int, ...]:
+    """Shape of a column's row."""
+    return tuple(joints if size == "d" else size for size in _ROWS[name][1])
+
+
 def check_shard(shard: Shard) -> Shard:
     """Returns `shard` unchanged, or raises DataError naming the first bad column."""
-    for name, (dtype, row) in _ROWS.items():
-        column = getattr(shard, name)
+    joints = shard.path_q.shape[-1]
+    for name, (dtype, _) in _ROWS.items():
+        column, row = getattr(shard, name), _row(name, joints)
         if not np.issubdtype(column.dtype, dtype) or column.shape[1:] != row:
             raise DataError(
                 f"{name} is {column.dtype}{list(column.shape)}, "

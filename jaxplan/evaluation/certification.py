@@ -5,15 +5,15 @@ from collections import Counter
 import jax
 import numpy as np
 
+from jaxplan.base import Phase
 from jaxplan.collision import certify
 from jaxplan.motion import MotionPlanner
 from jaxplan.planning import Status
-from jaxplan.rollout import Phase
 from jaxplan.scene import Scene
 
 
 class Certification:
-    """Listens to the outer loop and certifies every path, and every motion before it runs.
+    """Listens to Algorithm 1 and certifies every path, and every motion before it runs.
 
     Contacts deeper than 1 mm are refused.
 
@@ -32,17 +32,18 @@ class Certification:
 
     def __call__(self, phase: Phase) -> None:
         """Certifies a round."""
-        result = phase.motion.result
-        for row, e in enumerate(phase.episodes):
+        decision = phase.action.decision
+        result = decision.motion.result
+        for e in phase.lanes:
             self.statuses[Status(result.status[e]).name] += 1
-            world = jax.tree.map(lambda leaf, e=e: leaf[e], phase.worlds)
-            line = phase.observation.q[row], phase.targets.q_goal[row]
+            world = jax.tree.map(lambda leaf, e=e: leaf[e], decision.worlds)
+            line = phase.observation.q[e], decision.subgoal.q_goal[e]
             straight = certify(self._scene, world, np.array(line, float))
             self.blocked += not straight.valid
             path = result.path[e, : result.path_length[e]]
             for waypoints, said in (
                 (path, self.refused),
-                (phase.motion.q[e], self.invalid),
+                (decision.motion.q[e], self.invalid),
             ):
                 if len(waypoints) < 2:
                     continue

@@ -19,7 +19,7 @@ class Counts(NamedTuple):
     """[P] which episode the problem belongs to."""
 
 
-def success(counts: Counts, rows: np.ndarray) -> Estimate:
+def solved_share(counts: Counts, rows: np.ndarray) -> Estimate:
     """Solved problems among `rows` [P] bool, in percent, with Wilson's interval."""
     solved, total = int(counts.solved[rows].sum()), int(rows.sum())
     if total == 0:

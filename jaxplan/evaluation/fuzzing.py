@@ -24,9 +24,8 @@ from jaxplan.collision.rows import clearance_rows
 from jaxplan.collision.touching import random_poses
 from jaxplan.config import PlannerConfig
 from jaxplan.evaluation.random_scenes import random_world
-from jaxplan.plan import Plan
-from jaxplan.planner import Planner
-from jaxplan.pose import Pose
+from jaxplan.ik import Pose
+from jaxplan.motion import Plan, Planner
 from jaxplan.scene import Scene
 from jaxplan.scene.contacts import kind_of
 

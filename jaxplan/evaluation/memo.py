@@ -10,7 +10,7 @@ from typing import Any
 from jaxplan.data import write_atomic
 
 PLANNING = ("planning",)
-SAMPLING = (*PLANNING, "samplers", "diffusion", "networks")
+SAMPLING = (*PLANNING, "samplers", "diffusion", "networks", "learning")
 """Packages whose code decides what a piece's result is. Not `collision`: its verdicts are C
 MuJoCo's, however they are computed. Delete the pieces after a change to what collides."""
 

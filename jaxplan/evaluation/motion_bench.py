@@ -137,7 +137,7 @@ def sphere_cage() -> Problem:
 
 
 def table() -> Problem:
-    """From over the mug into the box, with a block in between."""
+    """From over a cup into the box, with a block in between."""
     obstacles = [
         _obstacle("box", [0.3, 0.5, 0.02], [0.6, 0, 0.1]),  # table top
         _obstacle("box", [0.12, 0.12, 0.005], [0.55, -0.3, 0.125]),  # floor of the box
@@ -146,7 +146,7 @@ def table() -> Problem:
         _obstacle("box", [0.13, 0.005, 0.06], [0.55, -0.425, 0.18]),
         _obstacle("box", [0.13, 0.005, 0.06], [0.55, -0.175, 0.18]),
         _obstacle("box", [0.05, 0.05, 0.2], [0.55, 0, 0.32]),  # block
-        _obstacle("capsule", [0.04, 0.03], [0.55, 0.3, 0.19]),  # mug
+        _obstacle("capsule", [0.04, 0.03], [0.55, 0.3, 0.19]),  # cup
     ]
     start = (0.31, 0.28, 0.21, -1.82, -0.07, 2.1, 0.78)
     goal = (-0.32, 0.38, -0.19, -1.9, 0.09, 2.27, 0.79)

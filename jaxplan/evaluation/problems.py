@@ -12,6 +12,7 @@ from typing import NamedTuple
 import jax
 import numpy as np
 
+from jaxplan.algorithm1 import phase_keys
 from jaxplan.collision import World
 from jaxplan.data import (
     MANIFEST,
@@ -22,7 +23,6 @@ from jaxplan.data import (
     verify,
     write_npz,
 )
-from jaxplan.rollout import phase_keys
 
 
 class Problems(NamedTuple):
@@ -41,21 +41,21 @@ class Problems(NamedTuple):
     blocked: np.ndarray
     """bool [P]: the straight motion from `q_start` to `q_goal` is not free."""
     q_start: np.ndarray
-    """f32 [P, 7] [rad]."""
+    """f32 [P, d] [rad]."""
     q_goal: np.ndarray
-    """f32 [P, 7] [rad]."""
+    """f32 [P, d] [rad]."""
     q_toggle: np.ndarray
-    """f32 [P, 7] [rad]."""
+    """f32 [P, d] [rad]."""
     gripper_toggle: np.ndarray
     """u8 [P]."""
     image: np.ndarray
     """u8 [P, 88, 136, 3]: what was observed, with the next two."""
     q: np.ndarray
-    """f32 [P, 7] [rad]: `q_start` but where that was moved out of a collision."""
+    """f32 [P, d] [rad]: `q_start` but where that was moved out of a collision."""
     gripper: np.ndarray
     """u8 [P]."""
     target: np.ndarray
-    """f32 [P, 7] [rad]: the subgoal as predicted; `q_goal` but for collisions, likewise."""
+    """f32 [P, d] [rad]: the subgoal as predicted; `q_goal` but for collisions, likewise."""
     object_pose: np.ndarray
     """The rest is the `World` of each problem."""
     held: np.ndarray

@@ -14,36 +14,38 @@ import jax
 import numpy as np
 
 from jaxplan import collision
-from jaxplan.agent import Upper
+from jaxplan.algorithm1 import Algorithm1
+from jaxplan.base import Agent, Phase
 from jaxplan.collision import World
-from jaxplan.config import PAPER_PLANNER, DemonstrationConfig
+from jaxplan.config import PAPER_PLANNER
+from jaxplan.demonstrations import ExpertAgent
+from jaxplan.demonstrations.expert import CLEAN
+from jaxplan.episodes import run_episodes
 from jaxplan.evaluation import problems as store
 from jaxplan.evaluation.problems import Problems
+from jaxplan.learned import Upper
 from jaxplan.learning import Weights
 from jaxplan.motion import MotionPlanner, jit
 from jaxplan.planning import points_for
-from jaxplan.rollout import Phase, Predict, Targets, rollout
-from jaxplan.scene.panda import PANDA_LIMITS
-from jaxplan.tasks.mug.demonstrate import ExpertPolicy
-from jaxplan.tasks.mug.scene import Variant, build
-from jaxplan.tasks.mug.task import MugTask
-from jaxplan.tasks.mug.way import expert_planner
+from jaxplan.tasks import Tabletop
 
 SHARD = 32
 """Episodes a shard, in lockstep."""
 
 
 def record(
-    variant: Variant,
+    task: Tabletop,
+    variant: str,
     seeds: range,
     predictor: Weights | None,
     directory: Path = Path("runs/problems"),
     progress: Callable[[int], object] = lambda done: None,
 ) -> tuple[Problems, str]:
-    """The problems of one episode per seed; those that are not there yet are made.
+    """The problems of one episode a seed; those that are not there yet are made.
 
     Args:
-        variant: Of the scene.
+        task: With `SHARD` lanes.
+        variant: Of its scene.
         seeds: As many as fill shards of 32; more are recorded otherwise, and left out.
         predictor: The upper network; None = the expert predicts.
         directory: Each variant and predictor has its own inside.
@@ -56,7 +58,7 @@ def record(
     name = f"{variant}-{upper[:8]}"
     settings = {
         "variant": variant,
-        "scene": fingerprint(build("planning", variant=variant)),
+        "scene": fingerprint(task.planning_scene.mj_model),
         "upper": upper,
         "shard": SHARD,
     }
@@ -66,7 +68,7 @@ def record(
     recorder = None
     for index, shard in zip(range(first, end), names, strict=True):
         if shard not in there:
-            recorder = recorder or Recorder(variant, predictor)
+            recorder = recorder or Recorder(task, predictor)
             part = recorder.run(range(index * SHARD, (index + 1) * SHARD))
             store.add(directory / name, shard, part)
         progress(SHARD)
@@ -88,24 +90,18 @@ class Recorder:
     """Runs episodes and keeps the problems that they pose.
 
     Args:
-        variant: Of the scene.
+        task: With `SHARD` lanes.
         predictor: The upper network; None = the expert predicts.
     """
 
-    def __init__(
-        self,
-        variant: Variant,
-        predictor: Weights | None,
-    ) -> None:
-        self._task = MugTask(SHARD, variant=variant)
-        self._planner = expert_planner(self._task)
-        scene = self._task.planning_scene
+    def __init__(self, task: Tabletop, predictor: Weights | None) -> None:
+        self._task, scene = task, task.planning_scene
+        planner = task.expert_planner()
         # The expert's planner takes some obstacles for thicker than the problems have them.
-        self._judge = MotionPlanner(scene, PANDA_LIMITS)
-        self._policy = ExpertPolicy(self._task, DemonstrationConfig(noisy_episodes=0))
-        self._predict: Predict = self._expert
+        self._judge = MotionPlanner(scene, task.robot.limits)
+        self._agent: Agent = ExpertAgent(task, CLEAN, planner)
         if predictor is not None:
-            self._predict = Upper(predictor, SHARD)
+            self._agent = Algorithm1(task, planner, Upper(predictor, task.camera))
         points = points_for(1.0, PAPER_PLANNER.edge_resolution)
         self._free = jit(
             lambda worlds, q0, q1: collision.motion_free(
@@ -119,48 +115,42 @@ class Recorder:
         self._seeds, self._rows = seeds, []
         self._toggles = np.zeros(len(seeds), int)
         self._closed = np.zeros(len(seeds), bool)
-        self._policy.reset(seeds)
-        records = rollout(
-            self._task, seeds, self._predict, self._planner, listen=self._listen
-        )
+        records = run_episodes(self._task, self._agent, seeds, listeners=[self._listen])
         columns = [np.array(column) for column in zip(*self._rows, strict=True)]
         order = np.lexsort((columns[1], columns[0]))
         seed, phase, *others = (column[order] for column in columns)
         well = [record.seed for record in records if record.success]
         return Problems(seed, phase, np.isin(seed, well), *others)
 
-    def _expert(self, observation, episodes: list[int]) -> Targets:
-        return Targets(*self._policy(observation, episodes))
-
     def _listen(self, phase: Phase) -> None:
         """Keeps a round's problems, but those of hands that back off for good."""
-        targets, observation = phase.targets, phase.observation
-        q = np.zeros((2, SHARD, observation.q.shape[1]), np.float32)
-        q[:, phase.episodes] = observation.q, targets.q_goal
-        start, goal = (self._judge.nearest_free(phase.worlds, ends) for ends in q)
-        free = self._straight(phase.worlds, start, goal)
-        worlds = jax.tree.map(np.asarray, phase.worlds)
-        for row, e in enumerate(phase.episodes):
-            closed = bool(observation.gripper[row])
+        seen, decision = phase.observation, phase.action.decision
+        subgoal, worlds = decision.subgoal, decision.worlds
+        ends = seen.q, subgoal.q_goal
+        start, goal = (self._judge.nearest_free(worlds, q) for q in ends)
+        free = self._straight(worlds, start, goal)
+        worlds = jax.tree.map(np.asarray, worlds)
+        for e in phase.lanes:
+            closed = bool(seen.gripper[e])
             self._toggles[e] += closed != self._closed[e]
             self._closed[e] = closed
-            if e in phase.leaving:
+            if e in decision.leaving:
                 continue
             self._rows.append(
                 (
                     np.int32(self._seeds[e]),
                     np.int32(phase.number),
                     np.int8(self._toggles[e] % 4),
-                    bool(phase.last[row]),
+                    bool(decision.at_toggle[e]),
                     not free[e],
                     start[e],
                     goal[e],
-                    targets.q_toggle[row].astype(np.float32),
-                    np.uint8(targets.gripper_toggle[row]),
-                    observation.image[row],
-                    observation.q[row].astype(np.float32),
+                    subgoal.q_toggle[e].astype(np.float32),
+                    np.uint8(subgoal.gripper_toggle[e]),
+                    seen.images[self._task.camera][e],
+                    seen.q[e],
                     np.uint8(closed),
-                    targets.q_goal[row].astype(np.float32),
+                    subgoal.q_goal[e].astype(np.float32),
                     *(leaf[e] for leaf in worlds),
                 )
             )

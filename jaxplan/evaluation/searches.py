@@ -5,24 +5,23 @@ nothing about a problem depends on its neighbours (`planning.search`).
 """
 
 import dataclasses
-from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxplan import collision, samplers
-from jaxplan.agent import BANK
 from jaxplan.config import PlannerConfig
 from jaxplan.evaluation.problems import Problems
+from jaxplan.ik import Limits
 from jaxplan.learning import Weights
 from jaxplan.learning.predictor import image_features
-from jaxplan.motion import jit
+from jaxplan.motion import Search
 from jaxplan.networks import Cond
-from jaxplan.planning import Segment, Status, make_planner
+from jaxplan.planning import DrawBank, Segment, Status
+from jaxplan.robots import JointLimits
+from jaxplan.samplers import Bank
 from jaxplan.scene import Scene
-from jaxplan.scene.panda import PANDA_LIMITS
 
 LANES = 256
 """Problems side by side."""
@@ -59,34 +58,22 @@ def conditions(problems: Problems, predictor: Weights) -> Cond:
     return Cond(**columns)
 
 
-class Banks:
+class KeptBanks:
     """Learned segments of P problems, drawn once, however many searches ask for them.
 
-    They are those that the outer loop's `Agent` would draw.
+    They are those that Algorithm 1 would draw.
 
     Args:
-        sampler: Its weights.
+        bank: Of segments.
         cond: Of the problems.
         keys: [P] typed, of the problems.
-        changes: To the sampler's config, such as `num_inference_steps`.
     """
 
-    def __init__(
-        self, sampler: Weights, cond: Cond, keys: jax.Array, **changes: Any
-    ) -> None:
-        config = dataclasses.replace(sampler.config, **changes)
-        self._cond, self._keys = cond, keys
-        self._tree_context = config.tree_context
+    def __init__(self, bank: Bank, cond: Cond, keys: jax.Array) -> None:
+        self._bank, self._cond, self._keys = bank, cond, keys
         self._chunks: dict[int, tuple[np.ndarray, Any]] = {}
 
-        @jit
-        def draw(cond, keys, chunk):
-            params = sampler.params
-            return samplers.draw_chunk(config, params, cond, keys, chunk, BANK)
-
-        self._draw = draw
-
-    def of(self, rows: np.ndarray) -> Callable[[jax.Array], Segment]:
+    def of(self, rows: np.ndarray) -> DrawBank:
         """The planner's `draw` for some of the problems."""
 
         def draw(chunk: jax.Array) -> Segment:
@@ -101,9 +88,9 @@ class Banks:
 
     def _empty(self, count: int) -> Any:
         """Room for a bank of `count` problems, a Segment of NumPy arrays."""
-        shape = count, BANK, self._cond.q.shape[1]
+        shape = count, self._bank.size, self._cond.q.shape[1]
         zeros: list[Any] = [np.zeros(n, np.float32) for n in (shape, shape[:2], shape)]
-        return Segment(*zeros[: 3 if self._tree_context else 2])
+        return Segment(*zeros[: 3 if self._bank.config.tree_context else 2])
 
     def _get(self, chunk: int, rows: np.ndarray) -> Any:
         """The segments of a chunk; those that nobody asked for yet are drawn."""
@@ -120,7 +107,7 @@ class Banks:
                 lambda leaf, at=block: jnp.asarray(leaf[at]), self._cond
             )
             number = jnp.full(BLOCK, chunk, jnp.int32)
-            drawn = self._draw(cond, self._keys[block], number)
+            drawn = self._bank.of(cond, self._keys[block])(number)
             _put(bank, part, drawn)
             there[part] = True
         return jax.tree.map(lambda leaf: leaf[rows], bank)
@@ -138,19 +125,18 @@ class Searcher:
     Args:
         scene: What collides.
         config: Settings of the search.
+        limits: Of the joints.
     """
 
-    def __init__(self, scene: Scene, config: PlannerConfig) -> None:
-        def config_free(worlds, problem, q):
-            world = jax.tree.map(lambda leaf: leaf[problem], worlds)
-            return collision.config_free(scene, world, q, config.margin)
-
+    def __init__(
+        self, scene: Scene, config: PlannerConfig, limits: JointLimits
+    ) -> None:
         config = dataclasses.replace(config, lanes=LANES)
-        limits = PANDA_LIMITS.q_min, PANDA_LIMITS.q_max
-        self._plan = make_planner(config_free, config, *limits, jit)
+        joints = Limits(limits.q_min, limits.q_max, np.zeros(len(limits.q_min), bool))
+        self._plan = Search(scene, config, joints, proven=False)()
 
     def __call__(
-        self, problems: Problems, rows: np.ndarray, banks: Banks | None = None
+        self, problems: Problems, rows: np.ndarray, banks: KeptBanks | None = None
     ) -> Answers:
         """Searches some of the problems, those alike beside each other.
 

@@ -5,10 +5,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from jaxplan.base import Phase
 from jaxplan.data import TOGGLES
-from jaxplan.rollout import Phase
-from jaxplan.tasks.mug.expert import Expert
-from jaxplan.tasks.mug.task import MugTask
+from jaxplan.tasks import Tabletop
 
 
 class ToggleError(NamedTuple):
@@ -30,27 +29,26 @@ class _Prediction(NamedTuple):
 
 
 class ToggleErrors:
-    """Listens to the outer loop and compares each prediction with the expert's toggle.
+    """Listens to Algorithm 1 and compares each prediction with the expert's toggle.
 
-    The expert sees the mug; it is asked after the prediction was made and answers nobody else.
+    The expert sees everything; it is asked after the prediction was made and answers nobody else.
     """
 
-    def __init__(self, task: MugTask) -> None:
-        self._task, self._expert = task, Expert(task.model, task.shape)
+    def __init__(self, task: Tabletop) -> None:
+        self._task = task
         self._predictions: list[_Prediction] = []
 
     def __call__(self, phase: Phase) -> None:
         """Keeps a round's predictions."""
-        for row, e in enumerate(phase.episodes):
-            dropped = self._task.closed[e] and not self._task.held(e)
-            if e in phase.missed or self._task.in_terminal_region(e) or dropped:
+        task, decision = self._task, phase.action.decision
+        for e in phase.lanes:
+            dropped = task.closed[e] and not task.held(e)
+            if e in decision.backing or task.in_terminal_region(e) or dropped:
                 continue
-            q = phase.observation.q[row].astype(float)
-            closed = bool(self._task.closed[e])
-            keyframes = self._expert.keyframes(self._task.mug(e), q, closed)
-            predicted = phase.targets.q_toggle[row]
+            keyframes = task.keyframes(e, phase.observation.q[e])
+            predicted = decision.subgoal.q_toggle[e]
             self._predictions.append(
-                _Prediction(e, int(keyframes.toggle), predicted, keyframes.q[-1])
+                _Prediction(e, keyframes.toggle, predicted, keyframes.q[-1])
             )
 
     def finish(self) -> list[ToggleError]:

@@ -1,13 +1,16 @@
-"""Losses, training loop, checkpoints, and the weights that come out."""
+"""Losses, training loop, checkpoints."""
 
+from jaxplan.learning.augment import AugmentConfig as AugmentConfig
 from jaxplan.learning.checkpoint import CheckpointError as CheckpointError
 from jaxplan.learning.loop import RunError as RunError
+from jaxplan.learning.loop import TrainConfig as TrainConfig
 from jaxplan.learning.loop import TrainingDiverged as TrainingDiverged
 from jaxplan.learning.loop import fit as fit
 from jaxplan.learning.loop import held_out as held_out
-from jaxplan.learning.pretrained import NoWeights as NoWeights
-from jaxplan.learning.pretrained import Weights as Weights
-from jaxplan.learning.pretrained import WeightsError as WeightsError
-from jaxplan.learning.pretrained import load_pair as load_pair
-from jaxplan.learning.pretrained import load_weights as load_weights
-from jaxplan.learning.pretrained import save_weights as save_weights
+from jaxplan.learning.losses import LossConfig as LossConfig
+from jaxplan.learning.predictor import PredictorTraining as PredictorTraining
+from jaxplan.learning.sampler import SegmentTraining as SegmentTraining
+from jaxplan.learning.train_state import OptimizerConfig as OptimizerConfig
+from jaxplan.learning.weights import NoWeights as NoWeights
+from jaxplan.learning.weights import Weights as Weights
+from jaxplan.learning.weights import WeightsError as WeightsError

@@ -1,9 +1,27 @@
 """Photometric augmentation of a batch of images."""
 
+from dataclasses import dataclass
+
 import jax
 import jax.numpy as jnp
 
-from jaxplan.config import AugmentConfig
+from jaxplan.ranges import Checked, NotNegative
+
+
+@dataclass(frozen=True)
+class AugmentConfig(Checked):
+    """Photometric augmentation, and no other.
+
+    With a camera on the hand, shifting the image would move the object and leave the label
+    behind.
+    """
+
+    brightness: NotNegative = 0.08
+    """Largest shift, as a share of the range."""
+    contrast: NotNegative = 0.15
+    """Largest relative change."""
+    noise: NotNegative = 0.01
+    """Standard deviation of pixel noise, as a share of the range."""
 
 
 def photometric(key: jax.Array, image: jax.Array, config: AugmentConfig) -> jax.Array:

@@ -5,6 +5,7 @@ import json
 import logging
 import time
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -14,18 +15,43 @@ import jax.numpy as jnp
 import numpy as np
 from tqdm import tqdm
 
-from jaxplan.config import TrainConfig
 from jaxplan.data import write_atomic
 from jaxplan.learning import checkpoint
 from jaxplan.learning.data_parallel import Devices
 from jaxplan.learning.train_state import (
     Loss,
+    OptimizerConfig,
     Params,
     TrainState,
     init_state,
     optimizer,
     train_step,
 )
+from jaxplan.ranges import Checked, Count, Probability, Whole
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrainConfig(Checked):
+    """What all trainings have in common."""
+
+    name: str
+    """The run's directory under `runs/`."""
+    data: tuple[str, ...] = ("data/demonstrations",)
+    """Directories of demonstrations."""
+    out: str | None = None
+    """Where the weights are exported when training ends; None = in the run's directory."""
+    init: str | None = None
+    """Directory of weights to start from, as after new demonstrations; None = fresh ones."""
+    seed: Whole = 0
+    steps: Whole = 100_000
+    batch_size: Count = 64
+    optimizer: OptimizerConfig = OptimizerConfig()
+    val_fraction: Probability = 0.05
+    """Share of the episodes (by seed) that is held out."""
+    log_every: Count = 50
+    validate_every: Count = 1000
+    checkpoint_every: Count = 1000
+
 
 logger = logging.getLogger(__name__)
 

@@ -1,30 +1,38 @@
 """The predictor's loss (equations 1 to 3), on joints scaled to [-1, 1]."""
 
-from typing import NamedTuple
+from dataclasses import dataclass
 
 import jax
 import jax.numpy as jnp
 import optax
 
-from jaxplan.config import LossConfig
+from jaxplan.base import Subgoal
 from jaxplan.networks import Prediction
+from jaxplan.ranges import Checked, NotNegative, Positive
 
 
-class Targets(NamedTuple):
-    """Labels of a batch, joints in [-1, 1]."""
+@dataclass(frozen=True)
+class LossConfig(Checked):
+    """Weights of equations 1 to 3, with the numbers of section 5.1."""
 
-    q_toggle: jax.Array
-    """[B, 7]."""
-    gripper_toggle: jax.Array
-    """[B], 0 open, 1 closed."""
-    q_goal: jax.Array
-    """[B, 7]."""
+    w_q: NotNegative = 2.0
+    w_g: NotNegative = 1.0
+    w_s: NotNegative = 1.0
+    w_r: NotNegative = 1e-4
+    huber_kappa: Positive = 2.0
+    lambda_lim: NotNegative = 1.0
+    lambda_prox: NotNegative = 0.5
+    delta: NotNegative = 0.02
+    """Margin of the limit hinge, in joints scaled to [-1, 1]."""
 
 
 def subgoal_loss(
-    config: LossConfig, prediction: Prediction, targets: Targets
+    config: LossConfig, prediction: Prediction, targets: Subgoal
 ) -> tuple[jax.Array, dict[str, jax.Array]]:
-    """Equation 1, averaged over the batch, and its terms before weighting."""
+    """Equation 1, averaged over the batch, and its terms before weighting.
+
+    Joints, also those of `targets`, are scaled to [-1, 1].
+    """
     terms = {
         "toggle": huber(prediction.q_toggle - targets.q_toggle, config.huber_kappa),
         "gripper": optax.sigmoid_binary_cross_entropy(
@@ -40,7 +48,7 @@ def subgoal_loss(
 
 
 def huber(error: jax.Array, kappa: float) -> jax.Array:
-    """Element-wise Huber of `error` [..., 7], averaged over the joints."""
+    """Element-wise Huber of `error` [..., d], averaged over the joints."""
     size = jnp.abs(error)
     inside = 0.5 * size**2
     return jnp.where(size <= kappa, inside, kappa * (size - 0.5 * kappa)).mean(-1)

@@ -1,6 +1,7 @@
 """Training the upper network: batches, loss, and what is measured on held-out episodes."""
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -8,13 +9,24 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxplan.config import PredictorConfig, PredictorTraining
+from jaxplan.base import Subgoal
 from jaxplan.data import TOGGLES, Shard
-from jaxplan.learning.augment import photometric
-from jaxplan.learning.loop import Metrics
-from jaxplan.learning.losses import Targets, subgoal_loss
+from jaxplan.learning.augment import AugmentConfig, photometric
+from jaxplan.learning.loop import Metrics, TrainConfig
+from jaxplan.learning.losses import LossConfig, subgoal_loss
 from jaxplan.learning.train_state import Params
-from jaxplan.networks import Predictor, normalize, predict
+from jaxplan.networks import Predictor, PredictorConfig, normalize, predict
+
+
+@dataclass(frozen=True, kw_only=True)
+class PredictorTraining(TrainConfig):
+    """`python -m jaxplan.train predictor`."""
+
+    name: str = "predictor"
+    network: PredictorConfig = PredictorConfig()
+    loss: LossConfig = LossConfig()
+    augment: AugmentConfig = AugmentConfig()
+
 
 VALIDATION_BATCH = 256
 
@@ -55,7 +67,7 @@ def loss(
         rngs={"dropout": key_dropout},
     )
     limits = config.network.q_min, config.network.q_max
-    targets = Targets(
+    targets = Subgoal(
         normalize(batch.q_toggle, *limits),
         batch.gripper_toggle,
         normalize(batch.q_goal, *limits),

@@ -1,20 +1,40 @@
 """What the trainings of all learned samplers share: batches, and how drawn segments are judged."""
 
 from collections.abc import Callable
-from typing import NamedTuple
+from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxplan import diffusion, samplers
-from jaxplan.config import SegmentTraining
+from jaxplan import diffusion
 from jaxplan.data import Shard
-from jaxplan.learning.loop import Metrics
+from jaxplan.learning.loop import Metrics, TrainConfig
 from jaxplan.learning.segments import PathRows, path_rows, training_segments
 from jaxplan.learning.train_state import Loss, Params
-from jaxplan.networks import Cond
+from jaxplan.networks import Cond, SegmentConfig
 from jaxplan.planning.segment import Segment
+from jaxplan.ranges import Count, NotNegative
+
+
+@dataclass(frozen=True, kw_only=True)
+class SegmentTraining(TrainConfig):
+    """What the trainings of all learned samplers have in common."""
+
+    network: SegmentConfig
+    predictor: str = "jaxplan/pretrained"
+    """Directory with the predictor's weights; read where the sampler has no encoder."""
+    target_noise: NotNegative = 0.02
+    """Standard deviation of the noise on q_toggle and q_goal in the condition [rad], so that
+    the sampler does not overtrust targets that a predictor will estimate."""
+    val_problems: Count = 64
+    val_segments: Count = 32
+    """Validation draws `val_segments` segments for each of `val_problems` conditions."""
+
+
+Draw = Callable[[Any, dict, Cond, jax.Array, int], Segment]
+"""`(config, params, cond [P], keys [P], n) -> Segment [P, n]`: a sampler family's."""
 
 
 class Phases(NamedTuple):
@@ -65,6 +85,7 @@ def perturb_targets(key: jax.Array, cond: Cond, scale: float) -> Cond:
 
 def validation(
     config: SegmentTraining,
+    draw: Draw,
     loss: Loss,
     shard: Shard,
     image: np.ndarray,
@@ -85,7 +106,7 @@ def validation(
     @jax.jit
     def run(params: Params, batch: Phases, many: Phases) -> dict[str, jax.Array]:
         keys = jax.random.split(key, len(batch.paths.arc))
-        drawn = samplers.draw(network, params, batch.cond, keys, n)
+        drawn = draw(network, params, batch.cond, keys, n)
         true = jax.vmap(
             lambda k: training_segments(
                 k, batch.paths, network.step_min, network.step_max

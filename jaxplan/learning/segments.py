@@ -19,7 +19,7 @@ class PathRows(NamedTuple):
     """For each frame the path that it lies on, and where."""
 
     q: jax.Array
-    """[B, N, 7], points uniform in arc length, ending at q_goal [rad]."""
+    """[B, N, d], points uniform in arc length, ending at q_goal [rad]."""
     length: jax.Array
     """[B], arc length of the path [rad]."""
     arc: jax.Array
@@ -43,7 +43,7 @@ def path_rows(shard: Shard, rows: np.ndarray) -> PathRows:
 def training_segments(
     key: jax.Array, paths: PathRows, step_min: float, step_max: float
 ) -> tuple[jax.Array, Segment]:
-    """One base [B, 7] [rad] and one segment of each path; base + s u lies on the path.
+    """One base [B, d] [rad] and one segment of each path; base + s u lies on the path.
 
     s is the straight distance to the point a drawn arc further, hence at most that arc.
     """
@@ -60,7 +60,7 @@ def training_segments(
 
 
 def point_at(paths: PathRows, arc: jax.Array) -> jax.Array:
-    """Points of the paths at arc positions [B] [rad], `[B, 7]` [rad]."""
+    """Points of the paths at arc positions [B] [rad], `[B, d]` [rad]."""
     last = paths.q.shape[-2] - 1
     place = jnp.clip(arc / jnp.maximum(paths.length, 1e-6), 0.0, 1.0) * last
     low = jnp.minimum(place.astype(jnp.int32), last - 1)

@@ -1,13 +1,29 @@
 """What training carries from step to step."""
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
 import optax
 
-from jaxplan.config import OptimizerConfig
+from jaxplan.ranges import Checked, NotNegative, Positive, Probability, Whole
+
+
+@dataclass(frozen=True)
+class OptimizerConfig(Checked):
+    """AdamW with warm-up and cosine decay to zero; EMA as in Diffusion Policy."""
+
+    learning_rate: NotNegative = 1e-4
+    warmup_steps: Whole = 500
+    betas: tuple[Probability, Probability] = (0.95, 0.999)
+    weight_decay: NotNegative = 1e-6
+    gradient_clip: Positive = 1.0
+    """Largest global norm of the gradient."""
+    ema_power: Positive = 0.75
+    ema_max: Probability = 0.9999
+
 
 Params = Any
 Loss = Callable[[Params, jax.Array, Any], tuple[jax.Array, dict[str, jax.Array]]]

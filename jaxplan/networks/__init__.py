@@ -1,16 +1,21 @@
 """The neural networks; the only package that imports Flax."""
 
 from jaxplan.networks.condition import Cond as Cond
+from jaxplan.networks.condition import SegmentConfig as SegmentConfig
+from jaxplan.networks.cvae import CvaeConfig as CvaeConfig
 from jaxplan.networks.cvae import CvaeNetwork as CvaeNetwork
+from jaxplan.networks.gan import GanConfig as GanConfig
 from jaxplan.networks.gan import GanNetwork as GanNetwork
-from jaxplan.networks.initial import init as init
-from jaxplan.networks.initial import network as network
+from jaxplan.networks.hand_camera import HandCameraConfig as HandCameraConfig
 from jaxplan.networks.joints import normalize as normalize
 from jaxplan.networks.joints import unnormalize as unnormalize
 from jaxplan.networks.predictor import Prediction as Prediction
 from jaxplan.networks.predictor import Predictor as Predictor
-from jaxplan.networks.predictor import Subgoal as Subgoal
+from jaxplan.networks.predictor import PredictorConfig as PredictorConfig
 from jaxplan.networks.predictor import as_subgoal as as_subgoal
 from jaxplan.networks.predictor import predict as predict
 from jaxplan.networks.resnet import Encoder as Encoder
+from jaxplan.networks.resnet import EncoderConfig as EncoderConfig
+from jaxplan.networks.sampler import FewStepConfig as FewStepConfig
+from jaxplan.networks.sampler import SamplerConfig as SamplerConfig
 from jaxplan.networks.sampler import SamplerNetwork as SamplerNetwork

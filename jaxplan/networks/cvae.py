@@ -1,12 +1,23 @@
 """The CVAE sampler's network (Ichter, Harrison and Pavone, ICRA 2018), over segments."""
 
+from dataclasses import dataclass
+
 import flax.linen as nn
 import jax
 import jax.numpy as jnp
 
-from jaxplan.config import CvaeConfig
-from jaxplan.networks.condition import Cond, Condition
+from jaxplan.networks.condition import Cond, Condition, SegmentConfig
 from jaxplan.networks.conditioned_mlp import ConditionedMlp
+from jaxplan.ranges import Count
+
+
+@dataclass(frozen=True)
+class CvaeConfig(SegmentConfig):
+    """The conditional VAE of Ichter, Harrison and Pavone, over segments."""
+
+    latent: Count = 3
+    hidden: tuple[Count, ...] = (512, 512)
+    """Of the recognition network and of the decoder."""
 
 
 class CvaeNetwork(nn.Module):

@@ -1,12 +1,23 @@
 """The conditional GAN's two networks, over segments; each has a condition network."""
 
+from dataclasses import dataclass
+
 import flax.linen as nn
 import jax
 import jax.numpy as jnp
 
-from jaxplan.config import GanConfig
-from jaxplan.networks.condition import Cond, Condition
+from jaxplan.networks.condition import Cond, Condition, SegmentConfig
 from jaxplan.networks.conditioned_mlp import ConditionedMlp
+from jaxplan.ranges import Count
+
+
+@dataclass(frozen=True)
+class GanConfig(SegmentConfig):
+    """Conditional GAN over segments. The paper gives no architecture."""
+
+    latent: Count = 16
+    generator: tuple[Count, ...] = (512, 512, 512)
+    discriminator: tuple[Count, ...] = (512, 512)
 
 
 class GanNetwork(nn.Module):

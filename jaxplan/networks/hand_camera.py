@@ -5,31 +5,40 @@ configuration. The joints are known, so the network need not learn the arm's kin
 where on the table a keypoint lies.
 """
 
+from dataclasses import dataclass
+
 import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxplan.config import HandCameraConfig
+from jaxplan.ranges import Checked, Number, Positive
+from jaxplan.robots.panda.mount import FLANGE, HAND_TURN, LINKS, MOUNT
 
-PANDA_LINKS = (
-    (0.0, 0.333, 0.0),
-    (0.0, 0.0, -np.pi / 2),
-    (0.0, 0.316, np.pi / 2),
-    (0.0825, 0.0, np.pi / 2),
-    (-0.0825, 0.384, -np.pi / 2),
-    (0.0, 0.0, np.pi / 2),
-    (0.088, 0.0, np.pi / 2),
-)
-"""Craig's (a [m], d [m], alpha [rad]) of each joint, as the maker gives them."""
-FLANGE, HAND_TURN = 0.107, -np.pi / 4
-"""From the last joint to the hand's frame: along z [m], about z [rad]."""
+
+@dataclass(frozen=True)
+class HandCameraConfig(Checked):
+    """How the hand's camera is mounted on a Panda, and what plane its rays are cut with."""
+
+    position: tuple[Number, Number, Number] = MOUNT.position
+    """In the hand's frame [m]."""
+    tilt: Number = MOUNT.tilt
+    """About the hand's y, from straight ahead [rad]."""
+    fovy: Positive = MOUNT.fovy
+    """Vertical field of view [deg]."""
+    aspect: Positive = MOUNT.width / MOUNT.height
+    plane: Number = 0.04
+    """Height above the table: the axis of what lies there [m]."""
+    centre: tuple[Number, Number] = (0.47, 0.0)
+    """Middle of what is looked at [m]."""
+    scale: Positive = 0.15
+    """Half of its extent [m]."""
 
 
 def camera_pose(config: HandCameraConfig, q: jax.Array) -> tuple[jax.Array, jax.Array]:
-    """Position [..., 3] [m] and axes (columns right, up, back) [..., 3, 3] at `q` [..., 7]."""
+    """Position [..., 3] [m] and axes (columns right, up, back) [..., 3, 3] at `q` [..., d]."""
     rotation = jnp.broadcast_to(jnp.eye(3), (*q.shape[:-1], 3, 3))
     position = jnp.zeros((*q.shape[:-1], 3))
-    for joint, (a, d, alpha) in enumerate(PANDA_LINKS):
+    for joint, (a, d, alpha) in enumerate(LINKS):
         twist = _about_x(alpha)
         position = position + rotation @ (jnp.array([a, 0.0, 0.0]) + d * twist[:, 2])
         rotation = rotation @ twist @ _about_z(q[..., joint])
@@ -45,7 +54,7 @@ def on_plane(config: HandCameraConfig, image: jax.Array, q: jax.Array) -> jax.Ar
     Args:
         config: Mount and lens.
         image: [..., K, 2], x to the right and y down, both in [-1, 1].
-        q: [..., 7] [rad].
+        q: [..., d] [rad].
 
     Returns:
         [..., K, 2], x and y in the world, about `config.centre` in units of `config.scale`,

@@ -1,39 +1,45 @@
 """The upper network F_psi: where the gripper toggles next, and the subgoal on the way."""
 
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import flax.linen as nn
 import jax
 import jax.numpy as jnp
 
-from jaxplan.config import PredictorConfig
-from jaxplan.networks.hand_camera import camera_pose, on_plane
+from jaxplan.base import Subgoal
+from jaxplan.networks.hand_camera import HandCameraConfig, camera_pose, on_plane
 from jaxplan.networks.joints import normalize, unnormalize
-from jaxplan.networks.resnet import Encoder
+from jaxplan.networks.resnet import Encoder, EncoderConfig
+from jaxplan.ranges import Checked, Count, Number, Probability
+from jaxplan.robots.panda.limits import Q_MAX, Q_MIN
+
+
+@dataclass(frozen=True)
+class PredictorConfig(Checked):
+    """The upper network F_psi (section 4.2)."""
+
+    encoder: EncoderConfig = EncoderConfig()
+    camera: HandCameraConfig | None = None
+    """Adds where on the table the keypoints lie, by way of the joints; None = as in the paper."""
+    state_features: Count = 64
+    hidden: Count = 256
+    dropout: Probability = 0.1
+    q_min: tuple[Number, ...] = Q_MIN
+    q_max: tuple[Number, ...] = Q_MAX
 
 
 class Prediction(NamedTuple):
     """What the three heads say; joints in [-1, 1], where the losses are taken."""
 
     q_toggle: jax.Array
-    """[..., 7]."""
+    """[..., d]."""
     gripper_logit: jax.Array
     """[...], of the gripper being closed after the toggle."""
     q_goal: jax.Array
-    """[..., 7]."""
+    """[..., d]."""
     features: jax.Array
     """[..., F], the encoder's image features."""
-
-
-class Subgoal(NamedTuple):
-    """One phase's targets, in radians."""
-
-    q_toggle: jax.Array
-    """[..., 7] [rad]."""
-    gripper_toggle: jax.Array
-    """i32 [...], 0 open, 1 closed."""
-    q_goal: jax.Array
-    """[..., 7] [rad]."""
 
 
 class Predictor(nn.Module):
@@ -45,7 +51,7 @@ class Predictor(nn.Module):
     def __call__(
         self, image: jax.Array, q: jax.Array, gripper: jax.Array, train: bool = False
     ) -> Prediction:
-        """`image` u8 [..., 88, 136, 3], `q` [..., 7] [rad], `gripper` [...] 0 or 1."""
+        """`image` u8 [..., 88, 136, 3], `q` [..., d] [rad], `gripper` [...] 0 or 1."""
         config = self.config
         features, keypoints = Encoder(config.encoder, name="encoder")(image)
         state = state_vector(q, gripper, config.q_min, config.q_max)

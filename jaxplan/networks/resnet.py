@@ -4,14 +4,38 @@ Padding, initialisation and epsilon follow torchvision's ResNet, so that `last_s
 (2, 2), width 64 and blocks (2, 2, 2, 2) is the ResNet-18 of Diffusion Policy's encoder.
 """
 
+from dataclasses import dataclass
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import flax.linen as nn
 import jax
 import jax.numpy as jnp
 
-from jaxplan.config import EncoderConfig
+from jaxplan.ranges import Checked, Count
+
+
+@dataclass(frozen=True)
+class EncoderConfig(Checked):
+    """Image encoder. The defaults are ResNet-18 with group normalisation (section 4.3)."""
+
+    stem: Literal["conv7", "patch4"] = "conv7"
+    """`conv7`: 7x7 stride 2 and max-pool. `patch4`: 4x4 pixels to channels and a 3x3; both
+    quarter the resolution."""
+    width: Count = 64
+    """Channels of the first stage; each later stage doubles them."""
+    blocks: tuple[Count, ...] = (2, 2, 2, 2)
+    """Residual blocks of each stage."""
+    last_strides: tuple[Count, Count] = (2, 2)
+    """Strides of the last two stages; 1 keeps spatial cells and with them precision."""
+    keypoints: Count = 32
+    """Maps of the spatial softmax."""
+    features: Count = 64
+    average: bool = False
+    """Adds a projection of the global average: whether and how big, beside where."""
+    scales: Count = 1
+    """Stages whose maps are summed before the spatial softmax, at the finest one's resolution."""
+
 
 _conv = partial(
     nn.Conv,

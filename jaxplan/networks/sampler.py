@@ -4,15 +4,39 @@ The FiLM vectors depend on the condition and the noise step only. `film` makes t
 for a phase, `denoise` uses them for all of its samples, and `__call__` is both in one.
 """
 
+from dataclasses import dataclass
+from typing import Literal
+
 import flax.linen as nn
 import jax
 import jax.numpy as jnp
 
-from jaxplan.config import SamplerConfig
-from jaxplan.networks.condition import Cond, Condition, mlp
+from jaxplan.networks.condition import Cond, Condition, SegmentConfig, mlp
 from jaxplan.networks.film_mlp import FilmMlp
 from jaxplan.networks.mish import mish
 from jaxplan.networks.unet1d import ConditionalUnet1D
+from jaxplan.ranges import Count, Whole
+
+
+@dataclass(frozen=True)
+class SamplerConfig(SegmentConfig):
+    """The diffusion sampler D_theta (section 4.3)."""
+
+    denoiser: Literal["unet1d", "film_mlp"] = "unet1d"
+    hidden: tuple[Count, ...] = (64, 128, 256)
+    """U-Net: channels of each level. FiLM-MLP: width of each block."""
+    step_features: Count = 128
+    num_train_timesteps: Count = 100
+    num_inference_steps: Count = 25
+
+
+@dataclass(frozen=True)
+class FewStepConfig(SamplerConfig):
+    """The diffusion sampler's noise-to-segment map in 1 to 4 steps, learned from it."""
+
+    num_inference_steps: Count = 1
+    noisiest: Whole = 96
+    """Noise step from which x_T starts, as the teacher's: DDIM-25 begins there."""
 
 
 class SamplerNetwork(nn.Module):
@@ -44,13 +68,13 @@ class SamplerNetwork(nn.Module):
         return self.modulation(mish(jnp.concatenate(both, axis=-1)))
 
     def denoise(self, x_t: jax.Array, film: jax.Array) -> jax.Array:
-        """eps for x_t [..., 8], with film broadcastable to [..., F]."""
+        """eps for x_t [..., size], with film broadcastable to [..., F]."""
         sizes = self.denoiser.film_sizes
         ends = [sum(sizes[: i + 1]) for i in range(len(sizes) - 1)]
         return self.denoiser(x_t, jnp.split(film, ends, axis=-1))
 
     def __call__(self, x_t: jax.Array, t: jax.Array, cond: Cond) -> jax.Array:
-        """eps for x_t [..., 8], t [...] and conditions [...]."""
+        """eps for x_t [..., size], t [...] and conditions [...]."""
         return self.denoise(x_t, self.film(self.cond(cond), t))
 
 

@@ -19,18 +19,18 @@ import jax
 import jax.numpy as jnp
 
 from jaxplan.config import PlannerConfig
-from jaxplan.planning import search
-from jaxplan.planning.edges import ConfigFree, all_free
+from jaxplan.planning import ends, search
+from jaxplan.planning.edges import ConfigFree
+from jaxplan.planning.methods import method_of
 from jaxplan.planning.result import PlanResult, Status
 from jaxplan.planning.segment import Segment
 from jaxplan.planning.space import Space, norm
 from jaxplan.planning.state import Query, State, searching
-from jaxplan.planning.sweep import SweptFree, sweep
+from jaxplan.planning.sweep import SweptFree
+from jaxplan.planning.verify import verify
 
 SHORTER = 0.999
 """A search for a shorter path looks for one that is shorter by this factor at least."""
-PIECE = 1 / 16
-"""Of a path that is to be proven free [rad]."""
 
 
 class Lanes(NamedTuple):
@@ -61,7 +61,7 @@ def empty(query: Query, lanes: int, space: Space, config: PlannerConfig) -> Lane
     first = jax.tree.map(lambda leaf: leaf[:lanes], query)
     zero = jnp.zeros(problems, jnp.int32)
     answers = PlanResult(
-        path=jnp.zeros((problems, search.waypoints(config), d)),
+        path=jnp.zeros((problems, ends.waypoints(config), d)),
         path_length=zero,
         status=zero,
         expansions=zero,
@@ -93,7 +93,7 @@ def begin(
         lanes: From `empty`, or of other problems that are over; else they stay as they are.
         new: Whether the problems are others than before.
         query: P problems.
-        status: `[P]` from `search.examine`.
+        status: `[P]` from `ends.examine`.
         space: Of the configurations.
         config: Planner settings.
     """
@@ -126,7 +126,7 @@ def run(
     Args:
         lanes: From `begin` or an earlier `run`.
         query: P problems.
-        status: `[P]` from `search.examine`.
+        status: `[P]` from `ends.examine`.
         bank: As for `search.advance`, of the lanes.
         config_free: The check of configurations; `problem` counts the P problems.
         swept_free: Proves configurations and what is near to them; None: paths are checked
@@ -201,10 +201,12 @@ def _harvest(
 ) -> Lanes:
     """Looks after the lanes that are `due [L]`: a new question, or an answer to write down."""
     state, problems = lanes.state, len(status)
-    found = search.finish(state, space, config)
+    found = ends.finish(state, space, config)
     opening = due & lanes.fresh & (state.status == Status.BUDGET_EXHAUSTED)
     solved = due & ~lanes.fresh & (found.status == Status.SOLVED)
-    sound, start_free, goal_free = _check(lanes, found, opening, solved, checks, config)
+    sound, start_free, goal_free = verify(
+        state.query, lanes.problem, found, opening, solved, checks, config
+    )
     opened = jnp.where(goal_free, state.status, Status.GOAL_IN_COLLISION)
     opened = jnp.where(start_free, opened, Status.START_IN_COLLISION)
     state = state._replace(status=opened.astype(jnp.int32))
@@ -214,7 +216,7 @@ def _harvest(
     )
     more = (state.expansions < config.max_expansions) & ~stop
     anew, bound = ~sound & more, state.query.bound
-    if search.optimises(config):
+    if method_of(config).optimises:
         # Until the budget is used, or the path is straight.
         gaps = norm(found.path[:, 1:] - found.path[:, :-1])
         bound = jnp.where(solved & sound, SHORTER * jnp.sum(gaps, axis=1), bound)
@@ -260,7 +262,7 @@ def _write(
 ) -> PlanResult:
     """The answers, with those of the lanes that are `done [L]`, or have a `better [L]` path."""
     first = jnp.isinf(lanes.state.query.bound)
-    path = better | (done & first) if search.optimises(config) else done
+    path = better | (done & first) if method_of(config).optimises else done
     own = {"path": path, "path_length": path, "status": path}
 
     def write(name: str) -> jax.Array:
@@ -269,40 +271,3 @@ def _write(
         return leaf.at[row].set(getattr(found, name), mode="drop")
 
     return PlanResult(*map(write, PlanResult._fields))
-
-
-def _check(
-    lanes: Lanes,
-    found: PlanResult,
-    opening: jax.Array,
-    solved: jax.Array,
-    checks: tuple[ConfigFree, SweptFree | None],
-    config: PlannerConfig,
-) -> tuple[jax.Array, jax.Array, jax.Array]:
-    """`[L]` each: path sound if `solved`, start and goal free if `opening`. One pass for all."""
-    config_free, swept_free = checks
-    count, waypoints, d = found.path.shape
-    dense = config.path_resolution > 0
-    gaps = norm(found.path[:, 1:] - found.path[:, :-1])
-    spacing = config.path_resolution if swept_free is None else PIECE
-    places = jnp.ceil(gaps / spacing) if dense else 0 * gaps
-    edge = jnp.arange(waypoints - 1)
-    counts = jnp.where(
-        solved[:, None] & (edge < found.path_length[:, None] - 1) & dense,
-        jnp.maximum(places, 1).astype(jnp.int32),
-        0,
-    )
-    lane = jnp.arange(count, dtype=jnp.int32)
-    ends = jnp.concatenate(lanes.state.query[:2])
-    check = partial(all_free, config_free)
-    if swept_free is not None:
-        check = partial(sweep, swept_free)
-    free = check(
-        lanes.problem[jnp.concatenate([jnp.repeat(lane, waypoints - 1), lane, lane])],
-        jnp.concatenate([found.path[:, :-1].reshape(-1, d), ends]),
-        jnp.concatenate([found.path[:, 1:].reshape(-1, d), ends]),
-        jnp.concatenate([counts.reshape(-1), opening, opening], dtype=jnp.int32),
-        search.rows_for(count, config),
-    )
-    paths, start_free, goal_free = jnp.split(free, [counts.size, counts.size + count])
-    return paths.reshape(counts.shape).all(1), start_free, goal_free

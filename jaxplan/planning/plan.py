@@ -22,9 +22,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from jaxplan.config import PlannerConfig
-from jaxplan.planning import lanes, search
+from jaxplan.planning import ends, lanes
+from jaxplan.planning.methods import method_of
 from jaxplan.planning.result import PlanResult, Status
-from jaxplan.planning.segment import Segment
+from jaxplan.planning.segment import DrawBank, Segment
 from jaxplan.planning.settings import check_settings
 from jaxplan.planning.space import Space
 from jaxplan.planning.state import Query
@@ -65,8 +66,8 @@ def make_planner(
     Returns:
         `plan(worlds, q_start [P, d], q_goal [P, d], q_toggle [P, d], keys [P], draw=None,
         active=None, goals=None, time_limit=inf, stopped=None) -> PlanResult`.
-        `draw(chunk [P]) -> Segment [P, M]` gives the learned segments `chunk * M` to
-        `chunk * M + M - 1` of each problem; without it all proposals are uniform. It is
+        `draw` is a `DrawBank`; bank c holds segments `c * M` to `c * M + M - 1` of each
+        problem; without it all proposals are uniform. It is
         asked when a search asks for a segment (the very first call also asks to see how
         large M is). `active [P]` is false for padding lanes. `goals [P, G - 1, d]` are as
         good as q_goal (`rrt_connect` only). What is not solved after `time_limit` [s], or
@@ -91,7 +92,7 @@ def make_planner(
         rounds: jax.Array,
         stop: jax.Array,
     ) -> lanes.Lanes:
-        query, status = search.examine(query, space)
+        query, status = ends.examine(query, space)
         status = jnp.where(active, status, Status.INACTIVE).astype(jnp.int32)
         state = lanes.begin(state, new, query, status, space, config)
         if bank is not None:  # there is none yet
@@ -120,21 +121,21 @@ def make_planner(
     advance = jit(run, donate_argnums=1)
     used: dict[tuple[int, ...], list[lanes.Lanes]] = {}
     """Lanes of single problems that are over: getting memory is a good part of a question."""
-    rows: list[int] = []
-    """M, once a bank was seen."""
+    seen: list[tuple[int, bool]] = []
+    """M, and whether segments have bases, once a bank was seen."""
 
-    def first_bank(draw: Callable[[jax.Array], Segment] | None, problems: int) -> Any:
+    def first_bank(draw: DrawBank | None, problems: int) -> Any:
         """A bank that nobody reads: whoever asks for a segment waits for the first one."""
         if draw is None or config.p_uniform >= 1:
             return None
-        if not rows:
-            rows.append(draw(jnp.zeros(problems, jnp.int32)).length.shape[1])
-        if rows[0] < config.workers:
-            raise ValueError(
-                f"a bank of {rows[0]} segments for {config.workers} workers"
-            )
-        shape = problems, rows[0]
-        return Segment(jnp.zeros((*shape, d)), jnp.zeros(shape))
+        if not seen:
+            bank = draw(jnp.zeros(problems, jnp.int32))
+            seen.append((bank.length.shape[1], bank.base is not None))
+        rows, based = seen[0]
+        if rows < config.workers:
+            raise ValueError(f"a bank of {rows} segments for {config.workers} workers")
+        q = jnp.zeros((problems, rows, d))
+        return Segment(q, q[..., 0], q if based else None)
 
     def plan(
         worlds: Worlds,
@@ -152,7 +153,7 @@ def make_planner(
         end = time.perf_counter() + time_limit
         query = _query(q_start, q_goal, q_toggle, keys, goals, d)
         problems = len(query.q_start)
-        if query.goals.shape[1] and config.method != "rrt_connect":
+        if query.goals.shape[1] and not method_of(config).goal_sets:
             raise ValueError(f"{config.method} has one goal; several need rrt_connect")
         active = np.ones(problems, bool) if active is None else np.asarray(active, bool)
         bank = first_bank(draw, problems)

@@ -11,6 +11,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxplan.config import PlannerConfig
+from jaxplan.planning.method import Method
 from jaxplan.planning.proposal import Draw, mixture
 from jaxplan.planning.segment import Segment, straightened
 from jaxplan.planning.space import Space
@@ -92,3 +93,6 @@ def ends(
     side = jnp.zeros_like(control.side[:, :1])
     best = nearest(tree, side, query.q_goal[:, None], space)[0][:, 0]
     return best, jnp.full_like(best, -1)
+
+
+RRT = Method(roots, begin, asks, propose, advance, ends)

@@ -18,6 +18,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxplan.config import PlannerConfig
+from jaxplan.planning.method import Method
 from jaxplan.planning.proposal import Draw, mixture
 from jaxplan.planning.segment import Segment, straightened
 from jaxplan.planning.space import Space
@@ -127,3 +128,7 @@ def ends(
     joint = jnp.where(side == START, aim, newest)
     solved = jnp.any(control.solved, axis=1)
     return jnp.where(solved, node, best), jnp.where(solved, joint, -1)
+
+
+RRT_CONNECT = Method(roots, begin, asks, propose, advance, ends, goal_sets=True)
+AO_RRT_CONNECT = RRT_CONNECT._replace(optimises=True, goal_sets=False)

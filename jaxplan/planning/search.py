@@ -1,7 +1,6 @@
 """The search loop: K workers of each problem share its trees.
 
-An algorithm (`rrt`, `rrt_connect`) is a machine with discrete control. From its control a
-worker proposes one move; the verdict on that move gives its next control. A round:
+A round of a method (`method.Method`):
 
     propose    every worker from the same state of the trees
     check      the motions of all workers of all problems together (`edges`)
@@ -17,13 +16,13 @@ other problems of a batch nor on its place among them.
 
 import jax
 import jax.numpy as jnp
-import numpy as np
 
 from jaxplan.config import PlannerConfig
-from jaxplan.planning import bounded, domain, rrt, rrt_connect
+from jaxplan.planning import bounded, domain
 from jaxplan.planning.edges import ConfigFree, motions_free
+from jaxplan.planning.methods import method_of
 from jaxplan.planning.proposal import draw_numbers
-from jaxplan.planning.result import PlanResult, Status
+from jaxplan.planning.result import Status
 from jaxplan.planning.segment import Segment, extend
 from jaxplan.planning.space import Space, norm
 from jaxplan.planning.state import Move, Outcome, Query, State, choose
@@ -32,62 +31,29 @@ from jaxplan.planning.tree import (
     bare,
     configurations,
     distances,
-    extract_path,
     first_min,
     insert,
     nearest,
     plant,
-    sizes,
 )
 
-METHODS = {"rrt": rrt, "rrt_connect": rrt_connect, "ao_rrt_connect": rrt_connect}
 NARROW = 4
 """Workers of a problem's first rounds."""
 WIDENING = 16
 """There is one worker to so many expansions that went before, up to all of them."""
 FINEST = 8
 """Halvings of the resolution at most."""
-LIMIT_SLACK = 1e-4
-"""How far a start or goal may lie outside the limits [rad]: rounding, no more."""
-MAX_WAYPOINTS = 512
-"""A longer path does not count as found."""
-
-
-def examine(query: Query, space: Space) -> tuple[Query, jax.Array]:
-    """Checks all of the questions but for collisions.
-
-    Args:
-        query: P problems.
-        space: Of the configurations.
-
-    Returns:
-        The query, finite everywhere, and `[P]` statuses: BUDGET_EXHAUSTED where there is
-        something to search.
-    """
-    given = jnp.stack([*query[:3], *jnp.moveaxis(query.goals, 1, 0)])
-    finite = jnp.all(jnp.isfinite(given), axis=(0, 2))
-    inside = np.clip(0.0, space.q_min, space.q_max)
-    given = jnp.where(finite[:, None], given, inside)
-    q_start, q_goal, q_toggle = given[:3]
-    goals = jnp.moveaxis(given[3:], 0, 1)
-    query = Query(q_start, q_goal, q_toggle, query.key, query.bound, goals)
-    ends = jnp.stack([q_start, q_goal, *given[3:]])
-    over = (ends < space.q_min - LIMIT_SLACK) | (ends > space.q_max + LIMIT_SLACK)
-    over = jnp.any(over, axis=(0, 2))
-    status = jnp.where(over, Status.OUT_OF_LIMITS, Status.BUDGET_EXHAUSTED)
-    status = jnp.where(finite, status, Status.INVALID_INPUT)
-    return query, status.astype(jnp.int32)
 
 
 def empty(query: Query, space: Space, config: PlannerConfig) -> State:
     """A state that searches nothing, for questions like those of `query [P]`."""
     problems, joints = query.q_start.shape
     zero = jnp.zeros(problems, jnp.int32)
-    roots = METHODS[config.method].roots(query).shape[1]
+    roots = method_of(config).roots(query).shape[1]
     return State(
         query=query,
         tree=bare(problems, joints, config.max_expansions + roots),
-        control=METHODS[config.method].begin(query, space, config),
+        control=method_of(config).begin(query, space, config),
         status=jnp.full(problems, int(Status.INACTIVE), jnp.int32),
         waiting=jnp.zeros_like(zero, bool),
         chunk=zero,
@@ -117,7 +83,7 @@ def start(
         space: Of the configurations.
         config: Planner settings.
     """
-    method = METHODS[config.method]
+    method = method_of(config)
     control = method.begin(query, space, config)
     found = (status == Status.BUDGET_EXHAUSTED) & jnp.any(control.solved, axis=1)
     status = jnp.where(found, Status.SOLVED, status).astype(jnp.int32)
@@ -152,13 +118,13 @@ def advance(
     Returns:
         The state; a problem that is `waiting` now needs the next `M` segments first.
     """
-    method, control, query = METHODS[config.method], state.control, state.query
+    method, control, query = method_of(config), state.control, state.query
     worker = jnp.arange(config.workers, dtype=jnp.int32)
     number = state.expansions[:, None] + worker
     box = space.box(query.q_start[:, None], query.q_goal[:, None])
     draw = draw_numbers(query.key, number, box, config)
     most = None
-    if optimises(config):
+    if method.optimises:
         draw, most = bounded.informed(draw, query, control.side, space)
         most = jnp.where(control.connecting, jnp.inf, most)
     running = able[:, None] & (number < config.max_expansions)
@@ -195,7 +161,7 @@ def advance(
     length = norm(q_new - q_base)
     cost = at(state.tree.cost, base) + length
     moves = reached | (length > 1e-6)
-    if optimises(config):
+    if method.optimises:
         moves &= known | control.chained
         moves &= bounded.admits(cost, q_new, reached, control, state.tree, query, space)
 
@@ -235,11 +201,6 @@ def advance(
         checks=state.checks + checks,
         attempt=state.attempt,
     )
-
-
-def optimises(config: PlannerConfig) -> bool:
-    """Whether the search goes on after the first path."""
-    return config.method == "ao_rrt_connect"
 
 
 def _base(
@@ -306,29 +267,3 @@ def _check(
 def rows_for(lanes: int, config: PlannerConfig) -> int:
     """Configurations of one call: a single search has few at a time."""
     return min(config.check_rows, max(16, lanes * config.workers))
-
-
-def waypoints(config: PlannerConfig) -> int:
-    """W: room for the longest path that there can be, up to `MAX_WAYPOINTS`."""
-    return min(config.max_expansions + 2, MAX_WAYPOINTS)
-
-
-def finish(state: State, space: Space, config: PlannerConfig) -> PlanResult:
-    """Reads the paths out of the trees."""
-    method = METHODS[config.method]
-    node, joint = method.ends(state.tree, state.control, state.query, space)
-    searched = state.status <= Status.BUDGET_EXHAUSTED
-    node, joint = jnp.where(searched, node, -1), jnp.where(searched, joint, -1)
-    path, path_length = extract_path(state.tree, node, joint, waypoints(config))
-    path = space.unwound(path)
-    cut = path_length > path.shape[1]
-    return PlanResult(
-        path=path,
-        path_length=jnp.minimum(path_length, path.shape[1]),
-        status=jnp.where(cut, Status.BUDGET_EXHAUSTED, state.status),
-        expansions=state.expansions,
-        accepted=state.accepted,
-        learned=state.used,
-        checks=state.checks,
-        nodes=sizes(state.tree),
-    )

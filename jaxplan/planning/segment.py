@@ -11,6 +11,7 @@ The base is the node nearest to `target`; the move goes `length` from it, along
 `direction`, or straight at the target where `toward` is set.
 """
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import jax
@@ -45,6 +46,10 @@ class Segment(NamedTuple):
         """The way back."""
         base = None if self.base is None else self.end
         return Segment(-self.direction, self.length, base)
+
+
+DrawBank = Callable[[jax.Array], Segment]
+"""Learned segments of P problems: bank number `[P]` to its M segments, `[P, M]`."""
 
 
 class Proposal(NamedTuple):

@@ -5,7 +5,7 @@ Each one's own range is its type in `PlannerConfig`, checked when that is made.
 
 from jaxplan.config import PlannerConfig
 from jaxplan.planning.edges import points_for
-from jaxplan.planning.search import optimises
+from jaxplan.planning.methods import method_of
 
 MOST_POINTS = 2**20
 """Checked configurations of a motion at most."""
@@ -33,7 +33,7 @@ def check_settings(config: PlannerConfig, joints: int) -> None:
         )
     if config.metric is not None and len(config.metric) != joints:
         raise ValueError(f"metric {config.metric}, expected {joints} weights")
-    if optimises(config):
+    if method_of(config).optimises:
         if config.toggle_tie_break > 0 or config.metric is not None:
             raise ValueError("ao_rrt_connect has no toggle_tie_break and no metric")
         if config.uniform_mode != "toward":

@@ -1,5 +1,6 @@
 """The paper's sampler: tree-extension segments from a conditional diffusion model."""
 
+from dataclasses import dataclass
 from typing import Any
 
 import jax
@@ -7,9 +8,26 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxplan import diffusion
-from jaxplan.config import SamplerConfig, SegmentConfig
-from jaxplan.networks import Cond, SamplerNetwork
+from jaxplan.learning.sampler import Phases, SegmentTraining, examples
+from jaxplan.learning.train_state import Params
+from jaxplan.networks import Cond, SamplerConfig, SamplerNetwork
 from jaxplan.planning.segment import Segment
+from jaxplan.samplers.family import Family
+from jaxplan.samplers.segments import noise, segments
+
+
+@dataclass(frozen=True, kw_only=True)
+class SamplerTraining(SegmentTraining):
+    """`python -m jaxplan.train sampler`."""
+
+    name: str = "sampler"
+    network: SamplerConfig = SamplerConfig()
+
+
+def fresh(config: SamplerConfig, key: jax.Array, cond: Cond, training: bool) -> Params:
+    """Fresh weights."""
+    x_0 = jnp.zeros((1, config.size))
+    return SamplerNetwork(config).init(key, x_0, cond.gripper, cond)
 
 
 def draw(
@@ -48,17 +66,21 @@ def denoiser(
     return denoise
 
 
-def noise(config: SegmentConfig, keys: jax.Array, n: int, size: int) -> jax.Array:
-    """Normal numbers [P, n, size] of the problems with keys [P], at the temperature."""
-    normal = jax.vmap(lambda key: jax.random.normal(key, (n, size)))(keys)
-    return config.temperature * normal
+def loss(
+    config: SamplerTraining, params: Params, key: jax.Array, batch: Phases
+) -> tuple[jax.Array, dict[str, jax.Array]]:
+    """Equation 5: mean squared error of the noise on fresh segments."""
+    key_examples, key_eps = jax.random.split(key)
+    cond, x_0 = examples(config, key_examples, batch)
+    network: Any = SamplerNetwork(config.network)
+
+    def denoise(x_t: jax.Array, t: jax.Array) -> jax.Array:
+        return network.apply(params, x_t, t, cond)
+
+    steps = config.network.num_train_timesteps
+    return diffusion.eps_loss(key_eps, denoise, x_0, steps), {}
 
 
-def segments(config: SegmentConfig, x_0: jax.Array, cond: Cond) -> Segment:
-    """x_0 [P, n, size] as a Segment."""
-    joints, steps = len(config.q_min), (config.step_min, config.step_max)
-    direction, length = diffusion.decode(x_0, joints, *steps)
-    if not config.tree_context:
-        return Segment(direction, length)
-    q = jnp.broadcast_to(cond.q[:, None], direction.shape)
-    return Segment(direction, length, diffusion.decode_base(x_0, q))
+DIFFUSION = Family(
+    "sampler", SamplerConfig, SamplerTraining, SamplerNetwork, fresh, draw, loss
+)

@@ -13,7 +13,7 @@ ALWAYS = "always_touching"
 """Stands for what `always_touching` finds."""
 
 Exclude = str | Iterable[str | Sequence[str]] | None
-"""`ALWAYS`, pairs of bodies ("hand|mug" or ("hand", "mug")), both, or None."""
+"""`ALWAYS`, pairs of bodies ("hand|cup" or ("hand", "cup")), both, or None."""
 
 
 class Excluded(NamedTuple):

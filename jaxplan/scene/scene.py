@@ -23,8 +23,9 @@ from jaxplan.process import refuse_fork
 from jaxplan.scene.chain import line
 from jaxplan.scene.contacts import geom_pairs
 from jaxplan.scene.excludes import ALWAYS, Exclude, Excluded
+from jaxplan.scene.groups import mask_of, table_of
 from jaxplan.scene.limits import arm_limits, circular, rates
-from jaxplan.scene.names import geom_name, known, pair_of, shortened
+from jaxplan.scene.names import geom_name, known, shortened
 from jaxplan.scene.numbers import Numbers, read_numbers
 from jaxplan.scene.source import SLOTS, check_arguments, compile_model
 from jaxplan.scene.srdf import read_srdf
@@ -76,7 +77,7 @@ class Scene:
                 can touch whatever can touch anything.
             exclude: Contacts to leave out, besides the model's own: "always_touching", for
                 geoms that overlap wherever the arm is (neighbouring links, often; never
-                objects and slots); pairs of bodies, ("hand", "mug") or "hand|mug"; a list
+                objects and slots); pairs of bodies, ("hand", "cup") or "hand|cup"; a list
                 of both; or None. `excluded` says which.
 
         Raises:
@@ -265,22 +266,14 @@ class Scene:
         """`[n_groups]` mask of contact groups, for `World.ignored`.
 
         Args:
-            names: Pairs of bodies, "hand|mug" or ("hand", "mug") in either order; geoms
+            names: Pairs of bodies, "hand|cup" or ("hand", "cup") in either order; geoms
                 that hang on no body of their own belong to "world". Pairs that are not
                 checked anyway may be named.
 
         Raises:
             ValueError: There is no such body.
         """
-        bodies = self.structure.body_names
-        groups = [
-            {bodies[side.body] for side in group.contacts[0]} for group in self.groups
-        ]
-        mask = np.zeros(len(groups), bool)
-        for name in names:
-            pair = set(pair_of(name, bodies, [group.name for group in self.groups]))
-            mask |= [pair == group for group in groups]
-        return mask
+        return mask_of(self.groups, self.structure.body_names, names)
 
     @property
     def pairs(self) -> list[tuple[str, str, str]]:
@@ -294,12 +287,7 @@ class Scene:
 
     def group_table(self) -> np.ndarray:
         """`[ngeom, ngeom]` contact group of each pair of geoms, -1 = none."""
-        table = np.full((self.mj_model.ngeom, self.mj_model.ngeom), -1)
-        for index, group in enumerate(self.groups):
-            for contact in group.contacts:
-                for i, j in geom_pairs(contact):
-                    table[i, j] = table[j, i] = index
-        return table
+        return table_of(self.groups, self.mj_model.ngeom)
 
     def geom_name(self, geom: int) -> str:
         """A geom's name; body[number] where it has none."""

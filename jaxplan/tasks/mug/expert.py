@@ -6,16 +6,18 @@ one reference, so that labels never jump (methods: labels must be single-valued)
 """
 
 from enum import IntEnum
-from typing import NamedTuple
 
 import mujoco
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
-from jaxplan.tasks.mug.kinematics import RETREAT, InverseKinematics
+from jaxplan.base import Keyframes
+from jaxplan.robots import PANDA
+from jaxplan.robots.kinematics import InverseKinematics
 from jaxplan.tasks.mug.mug import MugShape
-from jaxplan.tasks.mug.scene import BOX_FLOOR, BOX_POSITION, Q_HOME
+from jaxplan.tasks.mug.scene import BOX_FLOOR, BOX_POSITION
+from jaxplan.tasks.tabletop import RETREAT
 
 UP = np.array([0.0, 0.0, 1.0])
 PITCH = np.radians(45)
@@ -43,17 +45,6 @@ class Toggle(IntEnum):
     RELEASE2 = 3
 
 
-class Keyframes(NamedTuple):
-    """Joint configurations on the way to a toggle, the toggle itself last."""
-
-    toggle: Toggle
-    q: np.ndarray
-    """(K, 7) [rad]: retreat (where a hand must leave the mug first), transit (looks again),
-    pre-contact, toggle."""
-    error: float
-    """Largest pose error that inverse kinematics left [m + rad]."""
-
-
 Approach = tuple[list[np.ndarray], np.ndarray]
 """Poses (4, 4) of the tool centre point, the toggle's last, and the reference of their IK [rad]."""
 
@@ -62,7 +53,7 @@ class Expert:
     """Answers what the predictor learns to answer, from the state that the predictor never sees."""
 
     def __init__(self, model: mujoco.MjModel, shape: MugShape = MugShape()) -> None:
-        self._ik = InverseKinematics(model)
+        self._ik = InverseKinematics(PANDA, model)
         self._shape = shape
 
     def next_toggle(self, mug: np.ndarray, q: np.ndarray, closed: bool) -> Toggle:
@@ -77,6 +68,9 @@ class Expert:
 
     def keyframes(self, mug: np.ndarray, q: np.ndarray, closed: bool) -> Keyframes:
         """Keyframes of the next toggle.
+
+        They are: retreat (where a hand must leave the mug first), transit (looks again),
+        pre-contact, toggle.
 
         Args:
             mug: Pose of the mug in the world, (4, 4).
@@ -95,7 +89,10 @@ class Expert:
             # Backing off must not change the arm's posture: continued from where the hand is.
             solved[0] = self._ik.solve(targets[0][:3, 3], targets[0][:3, :3], q)
         return Keyframes(
-            toggle, np.stack([s[0] for s in solved]), max(s[1] for s in solved)
+            toggle,
+            int(not closed),
+            np.stack([q for q, _ in solved]),
+            max(error for _, error in solved),
         )
 
     def _grasp_rim(self, mug: np.ndarray, q: np.ndarray) -> Approach:
@@ -136,7 +133,7 @@ class Expert:
         at_rim = hand[2, 2] > -0.9 and np.linalg.norm(hand[:3, 3] - mug[:3, 3]) < 0.10
         if at_rim:
             frames.insert(0, _moved(hand, -RETREAT * hand[:3, 2]))
-        return frames, Q_HOME
+        return frames, PANDA.q_home
 
     def _put_in_box(self, mug: np.ndarray, q: np.ndarray) -> Approach:
         place = _moved(
@@ -145,7 +142,7 @@ class Expert:
         )
         release = self._hand_for(mug, q, place)
         lift = _moved(_pose(*self._ik.pose(q)), [0, 0, 0.12])
-        return [lift, _moved(release, [0, 0, 0.09]), release], Q_HOME
+        return [lift, _moved(release, [0, 0, 0.09]), release], PANDA.q_home
 
     def _handle_is_right(self, mug: np.ndarray, q: np.ndarray) -> int:
         """Whether the handle lies on the other side of the axis than the rim that is held."""

@@ -1,9 +1,8 @@
-"""Poses of the mug: as physics keeps them, and where an episode begins."""
+"""Where an episode begins."""
 
 from typing import NamedTuple
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from jaxplan.tasks.mug.mug import MugShape
 
@@ -57,17 +56,3 @@ def in_range(mug: np.ndarray) -> bool:
         )
     ]
     return bool(all(inside) and abs(mug[2, 2]) < 0.1)
-
-
-def to_matrix(pose: np.ndarray) -> np.ndarray:
-    """(4, 4) of a position and a quaternion (w, x, y, z), shape (7,)."""
-    matrix = np.eye(4)
-    matrix[:3, 3] = pose[:3]
-    matrix[:3, :3] = Rotation.from_quat(pose[3:], scalar_first=True).as_matrix()
-    return matrix
-
-
-def from_matrix(matrix: np.ndarray) -> np.ndarray:
-    """Position and quaternion (w, x, y, z), shape (7,), of a (4, 4)."""
-    quat = Rotation.from_matrix(matrix[:3, :3]).as_quat(scalar_first=True)
-    return np.concatenate([matrix[:3, 3], quat])

@@ -1,25 +1,22 @@
 """The mug scene: Panda, table, mug, target box, cameras; a model for physics, one for planning."""
 
-from importlib import resources
 from typing import Literal, get_args
 
 import mujoco
 import numpy as np
 from numpy.typing import ArrayLike
 
-from jaxplan.scene.panda_visual import add_visuals
+from jaxplan.robots import PANDA
+from jaxplan.robots.panda.mount import MOUNT
 from jaxplan.tasks.mug.clutter import add_clutter
 from jaxplan.tasks.mug.mug import STIFF_CONTACT, MugShape, add_mug
-
-Q_HOME = np.array([0.0, -0.35, 0.0, -2.2, 0.0, 1.85, 0.785])
-"""Where every episode starts: gripper down, the wrist camera over the whole range of mugs [rad]."""
 
 BOX_POSITION = np.array([0.45, -0.36, 0.0])
 """Of the target box, on the table [m]."""
 BOX_INNER, BOX_WALL, BOX_HEIGHT, BOX_FLOOR = 0.085, 0.005, 0.04, 0.004
 """Half of the inner side, half of the wall's thickness, height and floor thickness [m]."""
 
-IMAGE_HEIGHT, IMAGE_WIDTH = 88, 136
+IMAGE_HEIGHT, IMAGE_WIDTH = MOUNT.height, MOUNT.width
 
 Kind = Literal["physics", "planning"]
 Variant = Literal["plain", "cluttered"]
@@ -29,11 +26,6 @@ PHYSICS = {"group": 3, "contype": 1, "conaffinity": 3}
 PLANNING = {"group": 4, "contype": 4, "conaffinity": 12}
 VISUAL = {"group": 2, "contype": 0, "conaffinity": 0}
 """Whose a geom of the surroundings is: what physics touches, planning checks, a camera sees."""
-
-
-def task_name(variant: Variant) -> str:
-    """As demonstrations and weights have it."""
-    return "mug" if variant == "plain" else f"mug_{variant}"
 
 
 def build(
@@ -61,9 +53,7 @@ def spec(
     """
     if variant not in get_args(Variant):
         raise ValueError(f"variant {variant!r}: plain or cluttered")
-    panda = resources.files("jaxplan.scene") / "panda.xml"
-    scene = mujoco.MjSpec.from_string(panda.read_text())
-    add_visuals(scene)
+    scene = PANDA.spec()
     scene.modelname = f"mug_{kind}"
     option = scene.option
     option.timestep = 0.002
@@ -78,9 +68,9 @@ def spec(
         add_clutter(scene, PHYSICS | STIFF_CONTACT, PLANNING, VISUAL)
     add_mug(scene, shape)
     _add_cameras(scene)
-    fingers = [0.04, 0.04]
+    home = [*PANDA.q_home, *PANDA.fingers * [PANDA.gripper.open]]
     mug = [0.5, 0, shape.height / 2, 1, 0, 0, 0]
-    scene.add_key(name="home", qpos=[*Q_HOME, *fingers, *mug], ctrl=[*Q_HOME, *fingers])
+    scene.add_key(name="home", qpos=[*home, *mug], ctrl=home)
     for geom in list(scene.geoms):
         if kind == "planning" and geom.group == 3 and geom.parent.name == "mug":
             # The mug's boxes serve both: against the robot they are exact where a finger enters.
@@ -155,11 +145,11 @@ def _add_box(scene: mujoco.MjSpec) -> None:
 
 def _add_cameras(scene: mujoco.MjSpec) -> None:
     """Adds `hand`, on the wrist, looking past the fingers, and `static`, in front of the table."""
-    tilt = -0.12
-    scene.body("hand").add_camera(
+    tilt = MOUNT.tilt
+    scene.body(PANDA.hand).add_camera(
         name="hand",
-        pos=[-0.065, 0, 0.0],
-        fovy=50,
+        pos=MOUNT.position,
+        fovy=MOUNT.fovy,
         quat=_camera_quat(forward=[-np.sin(tilt), 0, np.cos(tilt)], up=[-1, 0, 0]),
     )
     target, eye = np.array([0.3, -0.05, 0.22]), np.array([1.5, -0.85, 0.9])

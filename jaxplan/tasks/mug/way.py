@@ -10,10 +10,10 @@ from dataclasses import replace
 
 from jaxplan.config import PAPER_PLANNER, PlannerConfig
 from jaxplan.motion import MotionPlanner
-from jaxplan.scene.panda import PANDA_LIMITS
+from jaxplan.robots import PANDA
+from jaxplan.scene import Scene
 from jaxplan.tasks.mug.clutter import thickened
 from jaxplan.tasks.mug.scene import Variant
-from jaxplan.tasks.mug.task import MugTask
 
 PLANNERS: dict[Variant, PlannerConfig] = {
     "plain": replace(PAPER_PLANNER, p_uniform=1.0),
@@ -30,13 +30,12 @@ ROOM = 0.01
 """What the expert adds to each side of an obstacle [m]."""
 
 
-def expert_planner(task: MugTask) -> MotionPlanner:
-    """The planner of demonstrations in a task's scene, and of recorded problems.
+def expert_planner(scene: Scene, variant: Variant) -> MotionPlanner:
+    """The planner of demonstrations, and of recorded problems.
 
     In clutter the paper's planner would not do for either: 500 uniform expansions are too few
     for many phases, and the episodes that are left would be the easy ones.
     """
-    scene = task.planning_scene
-    if task.variant == "cluttered":
+    if variant == "cluttered":
         scene = thickened(scene, ROOM)
-    return MotionPlanner(scene, PANDA_LIMITS, PLANNERS[task.variant])
+    return MotionPlanner(scene, PANDA.limits, PLANNERS[variant])

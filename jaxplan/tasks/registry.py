@@ -1,0 +1,70 @@
+"""The tasks by name: `load("mug", batch=32, variant="cluttered")`."""
+
+from collections.abc import Callable
+from typing import Any, NamedTuple, get_args
+
+from jaxplan.robots import PANDA
+from jaxplan.tasks.mug.scene import Variant
+from jaxplan.tasks.mug.task import MugTask
+from jaxplan.tasks.tabletop import Tabletop, full_name
+
+
+class TaskEntry(NamedTuple):
+    """How a task is made."""
+
+    make: Callable[..., Tabletop]
+    """(batch, variant=..., camera=..., friction=...)."""
+    variants: tuple[str, ...]
+    """Of its scene; the first is the plain one."""
+    robot: str
+    """Whose arm it is for."""
+
+
+TASKS = {"mug": TaskEntry(MugTask, get_args(Variant), PANDA.name)}
+
+
+DEFAULT = "mug"
+"""The paper's."""
+
+
+def names() -> list[str]:
+    """Of all tasks."""
+    return sorted(TASKS)
+
+
+def load(
+    name: str,
+    batch: int,
+    variant: str = "plain",
+    camera: str = "hand",
+    friction: float = 1.0,
+) -> Tabletop:
+    """A batch of episodes of a task.
+
+    Args:
+        name: One of `names()`.
+        batch: Number of episodes side by side.
+        variant: Of the scene.
+        camera: Which one takes the pictures.
+        friction: Factor on all friction; 0 shows that grasps hold by friction alone.
+
+    Raises:
+        ValueError: There is no such task, or no such variant of it.
+    """
+    check(name, variant)
+    settings: dict[str, Any] = {"camera": camera, "friction": friction}
+    return TASKS[name].make(batch, variant=variant, **settings)
+
+
+def check(name: str, variant: str = "plain") -> str:
+    """The name that demonstrations and weights have of a task's variant.
+
+    Raises:
+        ValueError: There is no such task, or no such variant of it.
+    """
+    if name not in TASKS:
+        raise ValueError(f"task {name!r}: there is {', '.join(names())}")
+    if variant not in TASKS[name].variants:
+        known = " or ".join(TASKS[name].variants)
+        raise ValueError(f"variant {variant!r} of {name}: {known}")
+    return full_name(name, variant)

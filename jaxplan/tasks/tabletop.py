@@ -1,0 +1,269 @@
+"""Tasks of one arm over a table, as physics sees them: observe, execute, and what planning knows.
+
+What is the same for all of them. A task says how an episode begins, where its objects are,
+which contacts its phases allow, and what counts as success.
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import jax.numpy as jnp
+import mujoco
+import numpy as np
+
+from jaxplan.base import Action, Keyframes, Observation
+from jaxplan.collision import World
+from jaxplan.config import PAPER_PLANNER
+from jaxplan.motion import MotionPlanner
+from jaxplan.robots import Robot
+from jaxplan.robots.kinematics import InverseKinematics
+from jaxplan.scene import Scene
+from jaxplan.simulation.camera import Camera
+from jaxplan.simulation.physics import Simulator
+from jaxplan.tasks.poses import from_matrix, to_matrix
+
+RETREAT = 0.10
+"""How far the hand backs off along its own axis after a release [m]."""
+
+
+def full_name(task: str, variant: str) -> str:
+    """Of a task's variant, as demonstrations and weights have it."""
+    return task if variant == "plain" else f"{task}_{variant}"
+
+
+class Tabletop(ABC):
+    """A batch of episodes in C MuJoCo, with one movable object.
+
+    Args:
+        name: As demonstrations and weights have it.
+        robot: Whose arm moves.
+        model: Of physics and pictures.
+        planning: What collides, for the planner.
+        allowed: Contacts that a phase allows, by how the object is (`free` or `held`) and
+            whether a toggle is near.
+        movable: Body of the object.
+        batch: Number of episodes side by side.
+        camera: Which one takes the pictures.
+        image: Its rows and columns [px].
+    """
+
+    def __init__(
+        self,
+        name: str,
+        robot: Robot,
+        model: mujoco.MjModel,
+        planning: mujoco.MjModel,
+        allowed: Mapping[tuple[str, bool], list[str]],
+        movable: str,
+        batch: int,
+        camera: str,
+        image: tuple[int, int],
+    ) -> None:
+        self.name, self.robot, self.model, self.batch = name, robot, model, batch
+        self.camera = camera
+        self.sim = Simulator(robot, model, batch)
+        self.closed = np.zeros(batch, bool)
+        self.planning_scene = Scene.from_mjcf(planning)
+        self._kinematics = InverseKinematics(robot, model)
+        self._image = image
+        self._camera: Camera | None = None
+        self._pads = {model.geom(pad).id for pad in robot.pads}
+        self._body = model.body(movable).id
+        start = int(model.jnt_qposadr[model.body_jntadr[self._body]])
+        self.object_slice = slice(start, start + 7)
+        """Where qpos holds the object's position and quaternion."""
+        self._velocity = int(model.jnt_dofadr[model.body_jntadr[self._body]])
+        self._narrow = np.zeros(batch, bool)
+        """Grippers that have released and are not open all the way."""
+        self._allowed = {
+            key: self.planning_scene.ignored(names) for key, names in allowed.items()
+        }
+
+    def expert_planner(self) -> MotionPlanner:
+        """The planner of demonstrations, and of recorded problems."""
+        config = replace(PAPER_PLANNER, p_uniform=1.0)
+        return MotionPlanner(self.planning_scene, self.robot.limits, config)
+
+    @abstractmethod
+    def reset(self, lanes: Sequence[int], seeds: Sequence[int]) -> None:
+        """Starts an episode in each of some lanes; all about it comes from its seed."""
+
+    @abstractmethod
+    def unfit(self, lane: int) -> str | None:
+        """Why an episode that has just begun cannot be asked of anybody, or None."""
+
+    @abstractmethod
+    def in_terminal_region(self, lane: int) -> bool:
+        """Q_term, known from the joints alone."""
+
+    @abstractmethod
+    def failure(self, lane: int) -> str | None:
+        """Why the finished episode is no success, or None."""
+
+    @abstractmethod
+    def keyframes(self, lane: int, q: np.ndarray) -> Keyframes:
+        """The expert's way from joints `q` [rad] to the next toggle. Privileged."""
+
+    def begin(self, lane: int, pose: np.ndarray) -> None:
+        """Arm at home, gripper open, the object at a pose (4, 4)."""
+        data = self.sim.data[lane]
+        mujoco.mj_resetDataKeyframe(self.model, data, 0)
+        data.qpos[self.object_slice] = from_matrix(pose)
+        self.closed[lane] = self._narrow[lane] = False
+
+    def object_pose(self, lane: int) -> np.ndarray:
+        """Of the object in the world, (4, 4).
+
+        Privileged: for the expert, the collision world and the judge.
+        """
+        return to_matrix(self.sim.data[lane].qpos[self.object_slice])
+
+    def object_speed(self, lane: int) -> float:
+        """Of its centre [m/s]. Privileged, likewise."""
+        first = self._velocity
+        return float(np.linalg.norm(self.sim.data[lane].qvel[first : first + 3]))
+
+    def observe(self, lanes: Sequence[int]) -> Observation:
+        """Renders the camera and reads joints and gripper mode."""
+        image, q, gripper = self._blank()
+        for e in lanes:
+            image[e] = self._render(self.sim.data[e])
+            q[e], gripper[e] = self.sim.q(e), self.closed[e]
+        return Observation({self.camera: image}, q, gripper)
+
+    def observe_at(self, lane: int, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """What the camera would see with the arm at `q` [rad]; a held object moves along.
+
+        Physics is not touched.
+
+        Returns:
+            The image, and `q` in single precision.
+        """
+        present, data = self.sim.data[lane], mujoco.MjData(self.model)
+        data.qpos[:] = present.qpos
+        data.qpos[self.robot.arm] = q
+        mujoco.mj_kinematics(self.model, data)
+        if self.held(lane):
+            in_hand = np.linalg.inv(self.hand_pose(present))
+            pose = self.hand_pose(data) @ in_hand @ self.object_pose(lane)
+            data.qpos[self.object_slice] = from_matrix(pose)
+        mujoco.mj_forward(self.model, data)
+        return self._render(data), np.asarray(q, np.float32)
+
+    def hand_pose(self, data: mujoco.MjData) -> np.ndarray:
+        """Pose of the hand's frame in the world, (4, 4)."""
+        pose, hand = np.eye(4), data.body(self.robot.hand)
+        pose[:3, 3], pose[:3, :3] = hand.xpos, hand.xmat.reshape(3, 3)
+        return pose
+
+    def tcp(self, lane: int) -> np.ndarray:
+        """The tool centre point, (3,) [m]."""
+        return self.sim.data[lane].site(self.robot.tcp).xpos
+
+    def pads_touching(self, lane: int) -> int:
+        """How many of the two pads touch the object."""
+        body = self.model.geom_bodyid
+        return len(
+            {
+                pad
+                for contact in self.sim.data[lane].contact
+                for pad, other in (contact.geom, contact.geom[::-1])
+                if pad in self._pads and body[other] == self._body
+            }
+        )
+
+    def held(self, lane: int) -> bool:
+        """Whether the closed gripper has the object between both pads."""
+        return bool(self.closed[lane]) and self.pads_touching(lane) == 2
+
+    def empty_handed(self, lane: int) -> bool:
+        """Whether the closed gripper's fingers have met. Known from the fingers alone."""
+        met = self.sim.fingers(lane).max() < self.robot.gripper.met
+        return bool(self.closed[lane] and met)
+
+    def retreat(self, lane: int) -> np.ndarray:
+        """Joints [rad] of a hand that has backed off along its own axis.
+
+        From the joints alone.
+        """
+        return self._kinematics.retreat(self.sim.q(lane), RETREAT)
+
+    def execute(self, lanes: Sequence[int], action: Action) -> np.ndarray:
+        """Moves and toggles; `[B]` bool, which toggled."""
+        toggled = np.zeros(self.batch, bool)
+        toggled[list(lanes)] = self.sim.map(lambda e: self._run(e, action), lanes)
+        return toggled
+
+    def wait(self, lanes: Sequence[int], seconds: float) -> None:
+        """Lets time pass."""
+        self.sim.map(lambda e: self.sim.wait(e, seconds), lanes)
+
+    def worlds(self, touching: np.ndarray) -> World:
+        """What planning may know of each episode: the object, how it is held, allowed contacts.
+
+        Args:
+            touching: `[B]` phases that end in a toggle or begin after one: there the held
+                object may meet or leave what it stands on, and an open hand the object.
+        """
+        rows = [self._world(e, bool(touching[e])) for e in range(self.batch)]
+        leaves = (jnp.asarray(np.stack(leaf)) for leaf in zip(*rows, strict=True))
+        return World(*leaves)
+
+    def _run(self, lane: int, action: Action) -> bool:
+        """One lane's commands, to the next change of the gripper's mode and on from there."""
+        q, modes = action.q[lane], action.gripper[lane]
+        first, toggled = 0, False
+        for at in range(len(q)):
+            if bool(modes[at]) == self.closed[lane] or (
+                at and modes[at] == modes[at - 1]
+            ):
+                continue
+            self._follow(lane, q[first : at + 1], action.settle)
+            first = at
+            off = np.abs(self.sim.q(lane) - action.q_toggle[lane]).max()
+            if off < action.tolerance:
+                self._toggle(lane, bool(modes[at]))
+                toggled = True
+        self._follow(lane, q[first:], action.settle)
+        return toggled
+
+    def _follow(self, lane: int, q: np.ndarray, settle: float) -> None:
+        """Executes commands `[T, d]`, if they are a motion; released fingers then open wide."""
+        if len(q) < 2:
+            return
+        self.sim.follow(lane, q, settle)
+        if self._narrow[lane]:
+            self.sim.open_wide(lane)
+            self._narrow[lane] = False
+
+    def _toggle(self, lane: int, close: bool) -> None:
+        """Toggles a gripper, ramped."""
+        (self.sim.close if close else self.sim.open)(lane)
+        self.closed[lane], self._narrow[lane] = close, not close
+
+    def _blank(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        lanes = self.batch
+        image = np.zeros((lanes, *self._image, 3), np.uint8)
+        q = np.zeros((lanes, self.robot.dof), np.float32)
+        return image, q, np.zeros(lanes, np.uint8)
+
+    def _render(self, data: mujoco.MjData) -> np.ndarray:
+        if self._camera is None:
+            self._camera = Camera(self.model, *self._image)
+        return self._camera.render(data, self.camera)
+
+    def _world(self, lane: int, touching: bool) -> tuple[np.ndarray, ...]:
+        """The leaves of an episode's `World`."""
+        data, pose, held = self.sim.data[lane], self.object_pose(lane), self.held(lane)
+        if held:
+            pose = np.linalg.inv(self.hand_pose(data)) @ pose
+        fingers = data.qpos[self.robot.finger_slice]
+        return (
+            from_matrix(pose)[None].astype(np.float32),
+            np.array([held]),
+            fingers.clip(0, self.robot.gripper.open).astype(np.float32),
+            self._allowed["held" if held else "free", touching],
+            np.zeros((0, 7), np.float32),
+            np.zeros((0, 3), np.float32),
+        )

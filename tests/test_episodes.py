@@ -1,0 +1,166 @@
+"""Episodes of Algorithm 1 with the expert in the networks' place, and with bad predictors."""
+
+import numpy as np
+
+from jaxplan.algorithm1 import Algorithm1, Algorithm1Config
+from jaxplan.base import Subgoal
+from jaxplan.demonstrations import ExpertAgent
+from jaxplan.episodes import EpisodeConfig, run_episodes
+from jaxplan.robots import PANDA
+from jaxplan.tasks.mug import poses
+from jaxplan.tasks.mug.task import MugTask
+
+
+def stay(observation, episodes):
+    """A predictor that always says q_curr, and the gripper's present mode."""
+    return Subgoal(observation.q, observation.gripper, observation.q)
+
+
+def run(task, planner, predict, seeds, max_phases=24, **settings):
+    """Episodes of Algorithm 1 with a predictor that has no features."""
+    agent = Algorithm1(
+        task,
+        planner,
+        lambda observation, lanes: (predict(observation, lanes), None),
+        config=Algorithm1Config(**settings),
+    )
+    return run_episodes(task, agent, seeds, EpisodeConfig(max_phases=max_phases))
+
+
+def without_time(record):
+    phases = [phase | {"planning_seconds": 0.0} for phase in record.phases]
+    return record._replace(phases=phases)
+
+
+def test_the_expert_puts_every_mug_in_the_box(demonstration):
+    assert [record.failure for record in demonstration.records] == [None] * 4
+    assert [record.seed for record in demonstration.records] == [0, 1, 2, 3]
+
+
+def test_every_episode_toggles_four_times_in_order(demonstration):
+    for record in demonstration.records:
+        toggles = [
+            phase["gripper_toggle"] for phase in record.phases if phase["toggled"]
+        ]
+        assert toggles == [1, 0, 1, 0]
+
+
+def test_records_tell_each_phase(demonstration):
+    for record in demonstration.records:
+        assert 12 <= len(record.phases) <= 16
+        for phase in record.phases:
+            assert phase["status"] == "SOLVED"
+            assert phase["expansions"] >= 1
+            assert phase["planning_seconds"] > 0
+            assert phase["smoothing"] in ("LINE", "SPLINE", "DENSER", "POLYLINE")
+            assert not phase["toggled"] or phase["subgoal"] == phase["q_toggle"]
+        for before, after in zip(record.phases, record.phases[1:], strict=False):
+            np.testing.assert_allclose(after["q_start"], before["subgoal"], atol=0.02)
+        assert record.expansions == sum(phase["expansions"] for phase in record.phases)
+
+
+def test_what_is_executed_is_certified_by_mujoco(demonstration):
+    assert demonstration.certification.refused == []
+    assert demonstration.certification.invalid == []
+
+
+def test_an_episode_does_not_depend_on_its_neighbours(demonstration, demonstrate):
+    """Alone in another lane it goes as before, to the last bit."""
+    alone = demonstrate(range(2, 3)).records[0]
+    assert without_time(alone) == without_time(demonstration.records[2])
+
+
+def test_without_friction_every_episode_fails(mug_planner):
+    task = MugTask(4, friction=0.0)
+    records = run_episodes(task, ExpertAgent(task, planner=mug_planner), range(4))
+    assert not any(record.success for record in records)
+    assert all(record.failure for record in records)
+
+
+def test_standing_still_ends_with_a_reason(mug_task, mug_planner):
+    records = run(mug_task, mug_planner, stay, range(4), max_phases=5)
+    for record in records:
+        assert record.failure == "no motion in phase 2: the subgoal is where the arm is"
+        assert len(record.phases) == 2
+        assert not any(phase["toggled"] for phase in record.phases)
+
+
+def test_a_goal_that_cannot_be_reached_ends_with_a_reason(mug_task, mug_planner):
+    below_the_table = np.array([0.0, 1.6, 0.0, -0.5, 0.0, 2.0, 0.0])
+
+    def predict(observation, episodes):
+        q = np.tile(below_the_table, (len(observation.q), 1))
+        return Subgoal(q, 1 - observation.gripper, q)
+
+    record = run(mug_task, mug_planner, predict, [0])[0]
+    assert "no motion in phase 2: GOAL_IN_COLLISION" in (record.failure or "")
+    assert "table" in (record.failure or "")
+    assert [phase["smoothing"] for phase in record.phases] == ["NONE"] * 2
+
+
+def test_toggling_on_the_spot_ends_with_a_reason(mug_task, mug_planner):
+    def toggle(observation, episodes):
+        return Subgoal(observation.q, 1 - observation.gripper, observation.q)
+
+    records = run(mug_task, mug_planner, toggle, range(2), max_phases=3)
+    for record in records:
+        assert record.failure == "not finished after 3 phases"
+        assert [phase["toggled"] for phase in record.phases] == [True] * 3
+
+
+def test_a_gripper_that_closed_on_nothing_opens_and_backs_off(mug_task, mug_planner):
+    """And one that holds the mug does not: what tells them apart is how far the fingers met."""
+
+    def close(observation, episodes):
+        return Subgoal(observation.q, np.ones(len(observation.q), int), observation.q)
+
+    record = run(mug_task, mug_planner, close, [0], max_phases=3, regrasp=True)[0]
+    assert [phase["gripper_toggle"] for phase in record.phases] == [1, 0, 0]
+    assert [phase["toggled"] for phase in record.phases] == [True, True, False]
+    assert not mug_task.closed[0]
+    high, low = (mug_task.sim.data[e].site("tcp").xpos[2] for e in (0, 1))
+    assert high - low > 0.09  # it looks down, so it backed off upwards
+
+    expert = ExpertAgent(mug_task, planner=mug_planner)
+    expert.reset(range(4))
+    agent = Algorithm1(
+        mug_task, mug_planner, expert.predict, config=Algorithm1Config(regrasp=True)
+    )
+    records = run_episodes(mug_task, agent, range(4))
+    assert all(record.success for record in records)
+    for record in records:
+        toggles = [
+            phase["gripper_toggle"] for phase in record.phases if phase["toggled"]
+        ]
+        assert toggles == [1, 0, 1, 0]
+
+
+def test_a_mug_outside_the_range_is_a_failure(mug_task, mug_planner, monkeypatch):
+    inside = poses.sample_pose
+
+    def sometimes_far(seed, shape):
+        position, rotation = inside(seed, shape)
+        return position + np.array([0.0, 0.1 if seed == 1 else 0.0, 0.0]), rotation
+
+    monkeypatch.setattr(poses, "sample_pose", sometimes_far)
+    asked = []
+
+    def predict(observation, episodes):
+        asked.extend(episodes)
+        return stay(observation, episodes)
+
+    records = run(mug_task, mug_planner, predict, [0, 1, 2], max_phases=2)
+    assert "outside the range" in (records[1].failure or "")
+    assert records[1].phases == []
+    assert set(asked) == {0, 2}
+    assert all("no motion" in (records[e].failure or "") for e in (0, 2))
+
+
+def test_a_prediction_that_is_not_finite_moves_nothing(mug_task, mug_planner):
+    def predict(observation, episodes):
+        q = np.full_like(observation.q, np.nan)
+        return Subgoal(q, observation.gripper, q)
+
+    record = run(mug_task, mug_planner, predict, [0])[0]
+    assert "no motion in phase 2: INVALID_INPUT" in (record.failure or "")
+    np.testing.assert_allclose(mug_task.sim.q(0), PANDA.q_home, atol=0.01)
