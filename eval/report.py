@@ -103,7 +103,7 @@ SECTIONS = (
         "Recovery after a failed grasp",
         ("success_noisy", "success_noisy_regrasp"),
         "python eval/success.py --seeds 210000:210064 --study.prediction-noise 0.03 "
-        "--study.rollout.regrasp --out eval/results/success_noisy_regrasp.json",
+        "--study.algorithm.regrasp --out eval/results/success_noisy_regrasp.json",
         "Not in the paper. No grasp fails with the shipped weights, so each joint of what the "
         "upper network says gets noise of 0.03 rad here: without recovery and with it.",
         summary.recovery,

@@ -16,7 +16,7 @@ from jaxplan.interrupt import CLOSED, INTERRUPTED, end_on_interrupt
 
 
 @dataclass(frozen=True)
-class Solve:
+class SolveCommand:
     """Plans and executes one episode with the shipped weights."""
 
     seed: int
@@ -31,7 +31,7 @@ class Solve:
 
 
 @dataclass(frozen=True)
-class Plan:
+class PlanCommand:
     """Plans a motion of any MJCF's arm from one pose to another, and certifies it.
 
     Exit code 0 with a certified motion, 1 without (the reason is printed), 2 for bad input.
@@ -62,7 +62,7 @@ class Plan:
 
 
 @dataclass(frozen=True)
-class Check:
+class CheckCommand:
     """Says what planning sees in an MJCF, and what is close or collides in a pose.
 
     Exit code 0 if the pose is free, 1 if it is not, 2 for bad input.
@@ -79,7 +79,7 @@ class Check:
     """The arm's last body; by default the last before the fingers."""
 
 
-COMMANDS = {"plan": Plan, "check": Check, "solve": Solve}
+COMMANDS = {"plan": PlanCommand, "check": CheckCommand, "solve": SolveCommand}
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -141,7 +141,7 @@ def _guarded(run: Callable[[], int]) -> int:
         return _fail((str(error) or type(error).__name__).splitlines()[0])
 
 
-def _plan(command: Plan) -> int:
+def _plan(command: PlanCommand) -> int:
     _check_seed(command.seed)
     _keep_compiled()
     from jaxplan.commands.plan import plan
@@ -150,14 +150,14 @@ def _plan(command: Plan) -> int:
     return 0 if plan(given.pop("scene"), **given) else 1
 
 
-def _check(command: Check) -> int:
+def _check(command: CheckCommand) -> int:
     from jaxplan.commands.check import check
 
     given = vars(command).copy()
     return 0 if check(given.pop("scene"), **given) else 1
 
 
-def _solve(command: Solve) -> int:
+def _solve(command: SolveCommand) -> int:
     _check_seed(command.seed)
     _keep_compiled()
     from jaxplan import tasks
@@ -173,7 +173,7 @@ def _solve(command: Solve) -> int:
 
 
 # They import when they run, so that `--help` and a typo answer at once.
-RUN = {Plan: _plan, Check: _check, Solve: _solve}
+RUN = {PlanCommand: _plan, CheckCommand: _check, SolveCommand: _solve}
 
 
 def _check_seed(seed: int) -> None:

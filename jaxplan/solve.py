@@ -14,6 +14,7 @@ from jaxplan.evaluation import ClosedLoop, ClosedLoopConfig
 from jaxplan.learning import Weights
 from jaxplan.pictures.film import Film
 from jaxplan.planning import Status
+from jaxplan.simulation.camera import require_gl
 
 
 def solve(
@@ -33,7 +34,8 @@ def solve(
     Returns:
         The episode as in `episode.json`.
     """
-    print("preparing: networks and planner are compiled, once ...")
+    require_gl()
+    print("networks and planner are being compiled ...")
     loop = ClosedLoop(weights, dataclasses.replace(config, batch=1))
     film, directory = None, None if out is None else Path(out)
     if directory is not None:

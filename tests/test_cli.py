@@ -7,7 +7,6 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
-from types import SimpleNamespace
 
 import imageio.v3 as iio
 import jax
@@ -78,10 +77,7 @@ def test_damaged_weights_are_named(refused, tmp_path):
 
 @pytest.mark.skipif(sys.platform != "linux", reason="elsewhere MuJoCo brings its own")
 def test_without_gl_it_says_what_to_install(refused, monkeypatch):
-    # The camera is asked before the networks.
-    blind = SimpleNamespace(predict=None, propose=None)
     monkeypatch.setattr("jaxplan.pretrained.load_pair", lambda _: (None, None))
-    monkeypatch.setattr("jaxplan.evaluation.closed_loop.learned", lambda *_: blind)
     monkeypatch.delenv("MUJOCO_GL", raising=False)
     monkeypatch.delenv("DISPLAY", raising=False)
     monkeypatch.setattr(ctypes.util, "find_library", lambda name: None)

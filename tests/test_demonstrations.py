@@ -48,7 +48,7 @@ def test_labels_are_clean_keyframes(shard, demonstration, mug_task):
 
 def test_some_episodes_were_driven_beside_their_labels(demonstration, shard):
     driven = {
-        record.seed: np.array([phase.subgoal for phase in record.phases], np.float32)
+        record.seed: np.array([phase["subgoal"] for phase in record.phases], np.float32)
         for record in demonstration.records
     }
     clean = {

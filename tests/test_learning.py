@@ -15,6 +15,7 @@ import pytest
 from toy_demonstrations import demonstrations
 
 from jaxplan import data, learning, pretrained, train
+from jaxplan.base import Subgoal
 from jaxplan.config import from_dict
 from jaxplan.learning import (
     AugmentConfig,
@@ -47,7 +48,7 @@ def test_loss_is_equation_1():
     value, _ = losses.subgoal_loss(
         config,
         Prediction(*map(jnp.asarray, (toggle, logit, goal, toggle))),
-        losses.Targets(*map(jnp.asarray, (want_toggle, mode, want_goal))),
+        Subgoal(*map(jnp.asarray, (want_toggle, mode, want_goal))),
     )
 
     def huber(e):
@@ -359,7 +360,7 @@ def test_the_door_trains_both_networks(demos, tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["planner"], "predictor, sampler, cvae"),
+        (["planner"], "predictor, sampler, few_step"),
         (["predictor", "--stepz", "3"], "did you mean --steps"),
         (["predictor", "--network.hiden", "3"], "did you mean --network.hidden"),
         (

@@ -17,10 +17,6 @@ from jaxplan.evaluation.motion_bench import (
 )
 
 sys.path.append(str(Path(__file__).parents[1] / "eval"))
-present = (data_directory() / "panda_problems.json").is_file()
-needs_data = pytest.mark.skipif(
-    not present, reason="MotionBenchMaker's files are absent"
-)
 
 
 @pytest.fixture(scope="module")
@@ -52,7 +48,6 @@ def test_what_is_not_installed_is_said_and_not_raised():
     assert "no_such_planner is not installed" in str(absent("no_such_planner"))
 
 
-@needs_data
 def test_the_peers_layout_changes_no_verdict(robot, problems):
     from peers import peer_model
 
@@ -67,7 +62,6 @@ def test_the_peers_layout_changes_no_verdict(robot, problems):
         )
 
 
-@needs_data
 def test_ompl_obeys_seeds_and_its_paths_hold(robot, problems):
     pytest.importorskip("ompl")
     from peers import peer_model
@@ -97,7 +91,6 @@ def test_ompl_obeys_seeds_and_its_paths_hold(robot, problems):
     np.testing.assert_array_equal(elsewhere.path, path)
 
 
-@needs_data
 def test_pybullet_agrees_with_mujoco(robot, problems):
     pytest.importorskip("pybullet")
     from peers import peer_model

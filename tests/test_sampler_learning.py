@@ -107,7 +107,7 @@ def test_the_door_trains_every_sampler(kind, trained):
     assert lower.config == DEBUG[kind].network
     assert lower.info["predictor_sha256"] == upper.info["sha256"]
     assert {"precision_median", "coverage_median"} <= set(lower.info["metrics"])
-    lower.check_fits("a test's", "hand")
+    lower.check_fits("a test's", "hand", "panda")
 
 
 @pytest.mark.parametrize("kind", SAMPLERS)
@@ -168,7 +168,8 @@ def test_shipped_weights_say_what_they_are_for():
     for variant, task in (("plain", "mug"), ("cluttered", "mug_cluttered")):
         for name in train.kinds():
             info = pretrained.load_weights(name, shipped(variant)).info
-            assert (info["tasks"], info["cameras"]) == ([task], ["hand"])
+            found = info["tasks"], info["cameras"], info["robots"]
+            assert found == ([task], ["hand"], ["panda"])
 
 
 def test_a_pupil_needs_its_teachers_predictor(trained, demos, tmp_path, capsys):

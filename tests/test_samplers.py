@@ -1,5 +1,6 @@
 """Drawing segments: units, independence from the rest of the batch, closed forms."""
 
+import pickle
 from dataclasses import replace
 
 import jax
@@ -7,9 +8,12 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxplan import samplers
+from jaxplan import Planner, samplers
+from jaxplan.config import PAPER_PLANNER
 from jaxplan.networks import Cond, CvaeConfig, FewStepConfig, GanConfig, SamplerConfig
-from jaxplan.samplers import few_step, init
+from jaxplan.pretrained import load_weights
+from jaxplan.robots import PANDA
+from jaxplan.samplers import Bank, few_step, init
 from jaxplan.samplers.diffusion import noise
 
 draw = jax.jit(samplers.draw, static_argnums=(0, 4))
@@ -118,3 +122,23 @@ def test_few_steps_part_the_teachers_way():
         assert few_step.timesteps(config).tolist() == steps
     with pytest.raises(ValueError, match="num_inference_steps is 97"):
         few_step.timesteps(FewStepConfig(num_inference_steps=97))
+
+
+def test_trained_weights_guide_the_public_planner(mug_task):
+    """By a bank under one observation: alone, in a batch and in a copy the same answer."""
+    weights = load_weights("sampler")
+    features = weights.params["params"]["condition"]["image_norm"]["scale"].shape
+    mug_task.reset([0], [0])
+    world = jax.tree.map(lambda leaf: leaf[0], mug_task.worlds(np.ones(4, bool)))
+    (goal, *_), q = mug_task.keyframes(0, PANDA.q_home).q, PANDA.q_home
+    sampler = Bank(weights).seeing(np.zeros(features, np.float32), 0, 1)
+    config = replace(PAPER_PLANNER, method="rrt", goal_bias=0.0)
+    planner = Planner(mug_task.planning_scene, config, sampler=sampler)
+    alone = planner.plan(q, goal, seed=3, world=world)
+    assert alone.solved, alone.reason
+    batch = planner.plan_batch([q] * 3, [goal] * 3, [1, 3, 2], world)
+    copy = pickle.loads(pickle.dumps(planner)).plan(q, goal, seed=3, world=world)
+    for again in (batch[1], copy):
+        np.testing.assert_array_equal(again.path, alone.path)
+    with pytest.raises(ValueError, match="num_inference_steps 4: CvaeConfig has none"):
+        Bank(load_weights("cvae"), num_inference_steps=4)

@@ -1,7 +1,6 @@
 """A second sampler family: one linear layer. One file, and a line in the registry."""
 
 from dataclasses import dataclass
-from functools import partial
 
 import flax.linen as nn
 import jax
@@ -11,7 +10,7 @@ from jaxplan import samplers, train
 from jaxplan.learning import SegmentTraining
 from jaxplan.learning.sampler import examples
 from jaxplan.networks import Cond, SegmentConfig
-from jaxplan.pretrained import load_weights
+from jaxplan.pretrained import DIRECTORY, load_weights
 from jaxplan.samplers import Bank, Family
 from jaxplan.samplers.segments import noise, segments
 
@@ -58,9 +57,8 @@ def test_it_is_trained_saved_and_drawn_from(monkeypatch, demos, tmp_path):
     monkeypatch.setitem(samplers.FAMILIES, "line", FAMILY)
     monkeypatch.setattr(train, "RUNS", tmp_path)
     monkeypatch.setattr(train, "_features", lambda upper, shard, _: shard.q)
-    monkeypatch.setattr(train.pretrained, "load_weights", partial(upper, load_weights))
-    arguments = ["line", "--data", demos, "--steps", "20", "--out", str(tmp_path / "w")]
-    assert train.main(arguments) == 0
+    out = ["--data", demos, "--steps", "20", "--out", str(tmp_path / "w")]
+    assert train.main(["line", "--predictor", str(DIRECTORY), *out]) == 0
     weights = load_weights("line", tmp_path / "w")
     q = jnp.zeros((3, 7))
     cond = Cond(q, q, q[:, 0], q, q[:, 0], q)
@@ -68,7 +66,3 @@ def test_it_is_trained_saved_and_drawn_from(monkeypatch, demos, tmp_path):
         [0, 1, 2]
     )
     assert segment.direction.shape == (3, 5, 7)
-
-
-def upper(load, name, directory):
-    return load(name) if name == "predictor" else load(name, directory)

@@ -10,51 +10,49 @@ from jaxplan.demonstrations.expert import CLEAN
 from jaxplan.episodes import run_episodes
 from jaxplan.robots import PANDA
 from jaxplan.robots.kinematics import InverseKinematics
-from jaxplan.tasks import Tabletop, TaskEntry
-from jaxplan.tasks.mug.scene import PHYSICS, PLANNING, VISUAL
 
-SIDE = 0.02
+HALF, PLACE = 0.02, np.array([0.5, 0.0, 0.02])
+PHYSICS, PLANNING = (3, 1, 3), (4, 16, 4)
+ALLOWED = ["left_finger|cube", "right_finger|cube", "cube|world"]
 
 
-def build(ours: dict, other: dict) -> mujoco.MjModel:
-    spec = PANDA.spec()
-    spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_PLANE, size=[1, 1, 1], **ours)
+def build(ours, other):
+    spec, box = PANDA.spec(), {"type": mujoco.mjtGeom.mjGEOM_BOX, "size": [HALF] * 3}
+    group, contype, conaffinity = ours
+    how = {"group": group, "contype": contype, "conaffinity": conaffinity}
+    spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_PLANE, size=[1, 1, 1], **how)
     spec.worldbody.add_camera(name="static", pos=[1.5, 0, 0.8])
-    cube = spec.worldbody.add_body(name="cube", pos=[0.5, 0, SIDE])
+    cube = spec.worldbody.add_body(name="cube", pos=PLACE)
     cube.add_freejoint()
-    size = {"type": mujoco.mjtGeom.mjGEOM_BOX, "size": 3 * [SIDE]}
-    cube.add_geom(
-        **size, mass=0.1, **ours | ({"contype": 16} if ours is PLANNING else {})
-    )
-    cube.add_geom(**size, mass=0, **VISUAL)
+    cube.add_geom(**box, **how, mass=0.1)
     home = [*PANDA.q_home, 0.04, 0.04]
-    spec.add_key(name="home", qpos=[*home, 0.5, 0, SIDE, 1, 0, 0, 0], ctrl=home)
-    for geom in [geom for geom in spec.geoms if geom.group == other["group"]]:
+    spec.add_key(name="home", qpos=[*home, *PLACE, 1, 0, 0, 0], ctrl=home)
+    for geom in [geom for geom in spec.geoms if geom.group == other[0]]:
         spec.delete(geom)
     return spec.compile()
 
 
-class Pick(Tabletop):
+class Pick(tasks.Tabletop):
     def __init__(self, batch, variant, camera, friction):
-        model, planning = build(PHYSICS, PLANNING), build(PLANNING, PHYSICS)
-        pads = ["left_finger|cube", "right_finger|cube", "cube|world"]
+        models = build(PHYSICS, PLANNING), build(PLANNING, PHYSICS)
         allowed = {
-            (how, near): pads for how in ("free", "held") for near in (False, True)
+            (how, at): ALLOWED for how in ("free", "held") for at in (False, True)
         }
-        super().__init__(
-            "pick", PANDA, model, planning, allowed, "cube", batch, "static", (24, 32)
-        )
-        self.ik = InverseKinematics(PANDA, model)
+        image = 24, 32
+        super().__init__("pick", PANDA, *models, allowed, "cube", batch, camera, image)
+        self.ik = InverseKinematics(PANDA, self.model)
 
     def reset(self, lanes, seeds):
         for lane, seed in zip(lanes, seeds, strict=True):
             pose = np.eye(4)
-            pose[:3, 3] = 0.5, np.random.default_rng(seed).uniform(-0.1, 0.1), SIDE
+            pose[:3, 3] = PLACE
+            pose[1, 3] += np.random.default_rng(seed).uniform(-0.1, 0.1)
             self.begin(lane, pose)
 
     def keyframes(self, lane, q):
         place, (_, down) = self.object_pose(lane)[:3, 3], self.ik.pose(PANDA.q_home)
-        ways = [self.ik.solve(place + [0, 0, z], down, PANDA.q_home) for z in (0.1, 0)]
+        above = np.array([0, 0, 0.1])
+        ways = [self.ik.solve(p, down, PANDA.q_home) for p in (place + above, place)]
         return Keyframes(0, 1, np.stack([q for q, _ in ways]), max(e for _, e in ways))
 
     def unfit(self, lane):
@@ -64,13 +62,12 @@ class Pick(Tabletop):
         return bool(self.closed[lane])
 
     def failure(self, lane):
-        return (
-            None if self.object_pose(lane)[2, 3] > 0.05 else "the cube was not lifted"
-        )
+        return None if self.object_pose(lane)[2, 3] > 0.05 else "not lifted"
 
 
 def test_the_expert_picks_up_cubes(monkeypatch):
-    monkeypatch.setitem(tasks.TASKS, "pick", TaskEntry(Pick, ("plain",), "panda"))
+    entry = tasks.TaskEntry(Pick, ("plain",), "panda")
+    monkeypatch.setitem(tasks.TASKS, "pick", entry)
     task = tasks.load("pick", batch=2, camera="static")
     records = run_episodes(task, ExpertAgent(task, CLEAN), range(3))
     assert [record.failure for record in records] == [None] * 3

@@ -8,7 +8,7 @@ import numpy as np
 
 from jaxplan.collision import always_touching, closest_pair
 from jaxplan.commands.model import (
-    Pose,
+    NamedPose,
     chains,
     default_pose,
     read_pose,
@@ -106,7 +106,7 @@ def _show_joints(scene: Scene, title: str, names: Sequence[str]) -> None:
         print(f"{title}: {', '.join(names)}")
 
 
-def _show_limits(scene: Scene, pose: Pose) -> bool:
+def _show_limits(scene: Scene, pose: NamedPose) -> bool:
     """Says which joints are out of their limits; whether none is."""
     over = (pose.q < np.asarray(scene.q_min)) | (pose.q > np.asarray(scene.q_max))
     for joint in np.flatnonzero(over):
@@ -115,7 +115,7 @@ def _show_limits(scene: Scene, pose: Pose) -> bool:
     return not over.any()
 
 
-def _show_contacts(scene: Scene, pose: Pose) -> bool:
+def _show_contacts(scene: Scene, pose: NamedPose) -> bool:
     """Lists the closest geoms of each pair of bodies, by C MuJoCo; whether none collide."""
     group_of = {frozenset(pair): group for group, *pair in scene.pairs}
     world, nearest = world_at(scene, pose), []

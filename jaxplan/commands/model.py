@@ -17,7 +17,7 @@ from jaxplan.scene.chain import simple_joints
 from jaxplan.scene.names import known
 
 
-class Pose(NamedTuple):
+class NamedPose(NamedTuple):
     """The arm's joints, and the rest of the model."""
 
     name: str
@@ -40,7 +40,7 @@ def read_scene(path: Path, joints: str | None, hand: str | None) -> Scene:
     return Scene.from_mjcf(path, names, hand)
 
 
-def read_pose(scene: Scene, text: str, role: str) -> Pose:
+def read_pose(scene: Scene, text: str, role: str) -> NamedPose:
     """A key frame by name, or as many numbers as the arm has joints, with commas between.
 
     Args:
@@ -75,7 +75,7 @@ def read_pose(scene: Scene, text: str, role: str) -> Pose:
         raise ValueError(
             f"{role} is not finite: joint {scene.joints[joint]!r} is {q[joint]}"
         )
-    return Pose(text, q, with_joints(scene, model.qpos0, q[None])[0])
+    return NamedPose(text, q, with_joints(scene, model.qpos0, q[None])[0])
 
 
 class Chain(NamedTuple):
@@ -101,18 +101,18 @@ def chains(scene: Scene, joints: Sequence[str]) -> list[Chain]:
     return [Chain(names[start], [name for _, name in run]) for start, run in runs]
 
 
-def default_pose(scene: Scene) -> Pose:
+def default_pose(scene: Scene) -> NamedPose:
     """The key frame `home`, or the first one, or the reference pose."""
     model = scene.mj_model
     keys = [model.key(i).name for i in range(model.nkey)]
     if keys:
         return _at_key(scene, keys.index("home") if "home" in keys else 0)
-    return Pose(
+    return NamedPose(
         "reference", model.qpos0[scene.addresses(scene.joints)], model.qpos0.copy()
     )
 
 
-def world_at(scene: Scene, pose: Pose) -> World:
+def world_at(scene: Scene, pose: NamedPose) -> World:
     """Fingers, objects and mocap bodies where the pose has them."""
     if pose.key is not None:
         return world_at_key(scene, pose.key)
@@ -127,10 +127,10 @@ def with_joints(scene: Scene, qpos: np.ndarray, q: np.ndarray) -> np.ndarray:
     return rows
 
 
-def _at_key(scene: Scene, key: int) -> Pose:
+def _at_key(scene: Scene, key: int) -> NamedPose:
     found = scene.mj_model.key(key)
     qpos = found.qpos.copy()
-    return Pose(repr(found.name), qpos[scene.addresses(scene.joints)], qpos, key)
+    return NamedPose(repr(found.name), qpos[scene.addresses(scene.joints)], qpos, key)
 
 
 def _is_number(text: str) -> bool:

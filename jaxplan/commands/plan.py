@@ -8,7 +8,13 @@ from typing import Any
 import numpy as np
 
 from jaxplan.collision import Certificate
-from jaxplan.commands.model import Pose, read_pose, read_scene, with_joints, world_at
+from jaxplan.commands.model import (
+    NamedPose,
+    read_pose,
+    read_scene,
+    with_joints,
+    world_at,
+)
 from jaxplan.config import PlannerConfig
 from jaxplan.motion import Plan, Planner, Timed
 from jaxplan.motion.reasons import joint_distance
@@ -127,7 +133,7 @@ def _verdict(certificate: Certificate) -> str:
 def _record(
     path: Path,
     scene: Scene,
-    ends: tuple[Pose, Pose],
+    ends: tuple[NamedPose, NamedPose],
     answer: Plan,
     timed: Timed | None,
     certificates: dict[str, Certificate],

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 from jaxplan.config import PAPER_PLANNER, PlannerConfig
 
 
-class Method(NamedTuple):
+class TableRow(NamedTuple):
     """A row of Table 2."""
 
     name: str
@@ -36,16 +36,16 @@ class Backbone(NamedTuple):
 
 OURS = "ours (diffusion, DDIM-25)"
 METHODS = (
-    Method(OURS, "sampler", paper=1.0),
-    Method("ours without tree context", "sampler", {"tree_context": False}),
-    Method("few-step", "few_step"),
-    Method("CVAE", "cvae", paper=1.36),
-    Method("conditional GAN", "gan", paper=1.67),
-    Method("uniform, no goal bias", None, {"goal_bias": 0.0}, 2.75),
-    Method("uniform, 5 % goal bias", None, {"goal_bias": 0.05}, 2.75),
-    Method("uniform, greedy", None, {"goal_bias": 0.05, "greedy": True}),
-    Method("goal-biased 0.5", None, {"goal_bias": 0.5}, 1.73),
-    Method("goal-biased 0.8", None, {"goal_bias": 0.8}),
+    TableRow(OURS, "sampler", paper=1.0),
+    TableRow("ours without tree context", "sampler", {"tree_context": False}),
+    TableRow("few-step", "few_step"),
+    TableRow("CVAE", "cvae", paper=1.36),
+    TableRow("conditional GAN", "gan", paper=1.67),
+    TableRow("uniform, no goal bias", None, {"goal_bias": 0.0}, 2.75),
+    TableRow("uniform, 5 % goal bias", None, {"goal_bias": 0.05}, 2.75),
+    TableRow("uniform, greedy", None, {"goal_bias": 0.05, "greedy": True}),
+    TableRow("goal-biased 0.5", None, {"goal_bias": 0.5}, 1.73),
+    TableRow("goal-biased 0.8", None, {"goal_bias": 0.8}),
 )
 BACKBONES = (
     Backbone(
@@ -76,7 +76,7 @@ BACKBONES = (
 )
 
 
-def planner(backbone: Backbone, method: Method, **changes: Any) -> PlannerConfig:
+def planner(backbone: Backbone, method: TableRow, **changes: Any) -> PlannerConfig:
     """Settings of a method in a backbone; without a sampler all proposals are uniform."""
     settings = dict(backbone.planner)
     if method.weights is None:

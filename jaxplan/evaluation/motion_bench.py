@@ -1,11 +1,11 @@
 """Planning problems that others are measured on: MotionBenchMaker, a cage, a table.
 
-The robots are the Panda as 59 spheres and the Fetch as 111, its torso's slide among its eight
+The robots are the Panda as spheres and the Fetch as 111, its torso's slide among its eight
 joints. They come as MJCF text, so that MuJoCo's own checker and every peer see the geoms
 that we see.
 
-MotionBenchMaker (Chamzas et al. 2021) is not part of the package: its two files for each
-robot, as the VAMP project distributes them, lie in `data_directory()`.
+A part of MotionBenchMaker (Chamzas et al. 2021) lies in the repository, `eval/data`; more,
+such as the Fetch, in the directory that `$JAXPLAN_MOTION_BENCH` names.
 """
 
 import json
@@ -37,8 +37,8 @@ class Problem(NamedTuple):
 
 
 def data_directory() -> Path:
-    """$JAXPLAN_MOTION_BENCH, by default `../shared/data` as seen from the checkout."""
-    default = "../shared/data/motion_bench_maker"
+    """$JAXPLAN_MOTION_BENCH, by default what the repository has of it."""
+    default = Path(__file__).parents[2] / "eval" / "data" / "motion_bench_maker"
     return Path(os.environ.get("JAXPLAN_MOTION_BENCH", default))
 
 

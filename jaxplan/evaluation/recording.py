@@ -68,7 +68,7 @@ def record(
     recorder = None
     for index, shard in zip(range(first, end), names, strict=True):
         if shard not in there:
-            recorder = recorder or Recorder(task, predictor)
+            recorder = recorder or ProblemRecorder(task, predictor)
             part = recorder.run(range(index * SHARD, (index + 1) * SHARD))
             store.add(directory / name, shard, part)
         progress(SHARD)
@@ -86,7 +86,7 @@ def fingerprint(model) -> str:
     return digest.hexdigest()[:16]
 
 
-class Recorder:
+class ProblemRecorder:
     """Runs episodes and keeps the problems that they pose.
 
     Args:

@@ -24,10 +24,10 @@ from jaxplan.planning.edges import ConfigFree
 from jaxplan.planning.methods import method_of
 from jaxplan.planning.result import PlanResult, Status
 from jaxplan.planning.segment import Segment
+from jaxplan.planning.soundness import check_ends_and_paths
 from jaxplan.planning.space import Space, norm
 from jaxplan.planning.state import Query, State, searching
 from jaxplan.planning.sweep import SweptFree
-from jaxplan.planning.verify import verify
 
 SHORTER = 0.999
 """A search for a shorter path looks for one that is shorter by this factor at least."""
@@ -204,7 +204,7 @@ def _harvest(
     found = ends.finish(state, space, config)
     opening = due & lanes.fresh & (state.status == Status.BUDGET_EXHAUSTED)
     solved = due & ~lanes.fresh & (found.status == Status.SOLVED)
-    sound, start_free, goal_free = verify(
+    sound, start_free, goal_free = check_ends_and_paths(
         state.query, lanes.problem, found, opening, solved, checks, config
     )
     opened = jnp.where(goal_free, state.status, Status.GOAL_IN_COLLISION)

@@ -1,6 +1,7 @@
 """Trained weights as a source of segments: for the episode loop, the studies, any planner."""
 
 import dataclasses
+from functools import cached_property, partial
 from typing import Any
 
 import jax
@@ -34,14 +35,23 @@ class Bank:
         if unknown := sorted(set(changes) - known):
             kind = type(weights.config).__name__
             raise ValueError(f"{unknown[0]} {changes[unknown[0]]}: {kind} has none")
-        self.config = config = dataclasses.replace(weights.config, **changes)
-        self.size = size
+        self._made = weights, size, changes
+        self.config, self.size = dataclasses.replace(weights.config, **changes), size
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """A copy is without its program."""
+        weights, size, changes = self._made
+        return partial(Bank, **changes), (weights, size)
+
+    @cached_property
+    def _draw(self) -> Any:
+        params = self._made[0].params
 
         def drawn(cond: Cond, keys: jax.Array, number: jax.Array) -> Segment:
             keys = jax.vmap(jax.random.fold_in)(keys, number)
-            return draw(config, weights.params, cond, keys, size)
+            return draw(self.config, params, cond, keys, self.size)
 
-        self._draw: Any = jax.jit(drawn, compiler_options=XLA_OPTIONS)
+        return jax.jit(drawn, compiler_options=XLA_OPTIONS)
 
     def of(self, cond: Cond, keys: jax.Array) -> DrawBank:
         """Banks of P problems, with fresh noise for each number.

@@ -7,10 +7,10 @@ from typing import NamedTuple
 import mujoco
 
 from jaxplan.scene.names import geom_name, pair_of
-from jaxplan.scene.touching import Motion, always_touching
+from jaxplan.scene.touching import Moving, touching_pairs
 
 ALWAYS = "always_touching"
-"""Stands for what `always_touching` finds."""
+"""Stands for what `touching_pairs` finds."""
 
 Exclude = str | Iterable[str | Sequence[str]] | None
 """`ALWAYS`, pairs of bodies ("hand|cup" or ("hand", "cup")), both, or None."""
@@ -36,7 +36,7 @@ class Excludes(NamedTuple):
 def find_excludes(
     model: mujoco.MjModel,
     bodies: tuple[str, ...],
-    motion: Motion,
+    motion: Moving,
     apart: Iterable[int],
     exclude: Exclude,
 ) -> Excludes:
@@ -60,7 +60,7 @@ def find_excludes(
         a, b = (bodies.index(name) for name in names)
         geoms |= {tuple(sorted(pair)) for pair in product(*_geoms(model, a, b))}
     if ALWAYS in entries:
-        found = always_touching(model, motion, apart)
+        found = touching_pairs(model, motion, apart)
         for pair, share in found.items():
             if pair not in geoms:
                 why = f"touch in {100 * share:.3g} % of random poses"

@@ -21,7 +21,7 @@ from jaxplan.scene.excludes import Exclude, Excludes, find_excludes
 from jaxplan.scene.flexes import refuse_flexes
 from jaxplan.scene.loops import refuse_loops
 from jaxplan.scene.names import known, names_of
-from jaxplan.scene.touching import Motion, near_distances
+from jaxplan.scene.touching import Moving, near_distances
 
 
 class Link(NamedTuple):
@@ -100,7 +100,7 @@ class Structure:
         """
         groups = (group for group in self.groups if not group.held)
         pairs = [p for group in groups for c in group.contacts for p in geom_pairs(c)]
-        motion = Motion(self.moved, self.variables, self.dependent)
+        motion = Moving(self.moved, self.variables, self.dependent)
         return near_distances(self.mj_model, motion, pairs)
 
 
@@ -145,7 +145,7 @@ def read_structure(
     refuse_flexes(model, moved | set(free))
     if not isinstance(exclude, Excludes):
         apart = [*free, *mocap, *([bodies.index(slots)] if slots else ())]
-        motion = Motion(moved, variables, dependent)
+        motion = Moving(moved, variables, dependent)
         exclude = find_excludes(model, bodies, motion, apart, exclude)
     groups = _groups(model, bodies, moved, free, exclude)
     needed = {bodies.index(hand)}

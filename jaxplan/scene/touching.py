@@ -42,7 +42,7 @@ CLOSE = 0.03
 """Distances of neighbours beyond this say nothing [m]."""
 
 
-class Motion(NamedTuple):
+class Moving(NamedTuple):
     """What moves in a model; see `Structure`."""
 
     moved: frozenset[int]
@@ -64,8 +64,8 @@ class Kinship(NamedTuple):
     """Neighbours of one robot: neither only stands in the world."""
 
 
-def always_touching(
-    model: mujoco.MjModel, motion: Motion, apart: Iterable[int]
+def touching_pairs(
+    model: mujoco.MjModel, motion: Moving, apart: Iterable[int]
 ) -> dict[tuple[int, int], float]:
     """Pairs of geoms that leave nothing to plan, and the share of poses in which they touch.
 
@@ -97,7 +97,7 @@ def always_touching(
 
 
 def near_distances(
-    model: mujoco.MjModel, motion: Motion, pairs: Iterable[tuple[int, int]]
+    model: mujoco.MjModel, motion: Moving, pairs: Iterable[tuple[int, int]]
 ) -> dict[tuple[int, int], float]:
     """Neighbours of the robot that are nearly always close, and how close [m].
 
@@ -216,7 +216,7 @@ def _touching(
     return {(i, j) for i, j in np.sort(close, -1).tolist()}
 
 
-def _poses(model: mujoco.MjModel, motion: Motion, count: int) -> np.ndarray:
+def _poses(model: mujoco.MjModel, motion: Moving, count: int) -> np.ndarray:
     """`[n, nq]`: random hinges and slides, the reference and key frames if within limits."""
     ids = list(motion.variables)
     limited = model.jnt_limited[ids] != 0

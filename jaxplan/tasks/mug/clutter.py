@@ -21,7 +21,7 @@ import numpy as np
 from jaxplan.scene import Scene
 
 
-class Obstacle(NamedTuple):
+class Slab(NamedTuple):
     """A box, parallel to the axes, between two corners [m]."""
 
     name: str
@@ -30,9 +30,9 @@ class Obstacle(NamedTuple):
 
 
 OBSTACLES = (
-    Obstacle("front_board", low=(0.48, 0.085, 0.605), high=(0.75, 0.105, 0.90)),
-    Obstacle("side_board", low=(0.33, -0.35, 0.63), high=(0.35, -0.10, 0.90)),
-    Obstacle("partition", low=(0.40, -0.220, 0.0), high=(0.70, -0.204, 0.115)),
+    Slab("front_board", low=(0.48, 0.085, 0.605), high=(0.75, 0.105, 0.90)),
+    Slab("side_board", low=(0.33, -0.35, 0.63), high=(0.35, -0.10, 0.90)),
+    Slab("partition", low=(0.40, -0.220, 0.0), high=(0.70, -0.204, 0.115)),
 )
 
 

@@ -17,7 +17,7 @@ PIECE = 1 / 16
 """Of a path that is to be proven free [rad]."""
 
 
-def verify(
+def check_ends_and_paths(
     query: Query,
     problem: jax.Array,
     found: PlanResult,

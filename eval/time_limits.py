@@ -1,0 +1,73 @@
+"""Whether a time limit is kept: hard problems, each with the same limit, programs warm.
+
+    python eval/time_limits.py --out runs/time_limits.json
+
+A wall stands between start and goal of the table, from before the base to beyond the arm's
+reach: the way leads over the arm's own back, if there is one. Seed after seed.
+"""
+
+import json
+import time
+from collections import Counter
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from tqdm import tqdm
+
+from jaxplan import Obstacle, Planner, PlannerConfig, Scene
+from jaxplan.cli import run_script
+from jaxplan.evaluation import versions
+from jaxplan.evaluation.motion_bench import (
+    data_directory,
+    obstacles_mjcf,
+    read_robot,
+    robot_mjcf,
+    table,
+)
+
+WALL = Obstacle("box", [0.9, 0.005, 1.5], [1.15, 0.0, 0.5, 1, 0, 0, 0])
+
+
+@dataclass(frozen=True)
+class Args:
+    """Asks with a time limit and measures how long each answer took."""
+
+    out: Path = Path("runs/time_limits.json")
+    data: Path = field(default_factory=data_directory)
+    """Directory with the Panda's spheres."""
+    problems: int = 200
+    time_limit: float = 0.1
+    """[s]."""
+
+
+def main(args: Args) -> None:
+    """Measures, prints, writes JSON."""
+    problem = table()
+    obstacles = (*problem.obstacles[:1], WALL)
+    model = robot_mjcf(read_robot(args.data), obstacles_mjcf(obstacles))
+    scene = Scene.from_mjcf(model)
+    planner = Planner(scene, PlannerConfig(max_expansions=1_000_000))
+    ends = problem.q_start, problem.q_goal
+    planner.plan(*ends, time_limit=60.0)  # compiles
+    seconds, statuses = [], Counter()
+    for seed in tqdm(range(args.problems), unit="problem"):
+        began = time.perf_counter()
+        plan = planner.plan(*ends, seed=seed, time_limit=args.time_limit)
+        seconds.append(time.perf_counter() - began)
+        statuses[plan.status.name] += 1
+    quantiles = np.quantile(seconds, [0.5, 0.95, 1.0]).tolist()
+    result = {
+        "time_limit": args.time_limit,
+        "seconds": dict(zip(("median", "p95", "most"), quantiles, strict=True)),
+        "statuses": dict(statuses),
+        "versions": versions(),
+    }
+    args.out.parent.mkdir(parents=True, exist_ok=True)
+    args.out.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
+    print(f"{result['seconds']} s at a limit of {args.time_limit} s; {dict(statuses)}")
+    print(f"written to {args.out}")
+
+
+if __name__ == "__main__":
+    run_script(main, Args)
