@@ -18,6 +18,8 @@ import numpy as np
 import pytest
 
 import jaxplan
+import jaxplan.evaluation
+import jaxplan.train
 from jaxplan import (
     Plan,
     Planner,
@@ -26,15 +28,15 @@ from jaxplan import (
     Status,
     TrajectoryConfig,
     collision,
-    config,
     planning,
 )
 from jaxplan import make_world as world_for
+from jaxplan.learning import SegmentTraining, TrainConfig
 from jaxplan.motion.blocks import SIZES
 from jaxplan.motion.checks import seeds_of
 from jaxplan.motion.goals import Goals
 from jaxplan.motion.reasons import Asked, no_path
-from jaxplan.ranges import check, kinds
+from jaxplan.ranges import Checked, check, kinds
 
 ARM = """
 <mujoco>
@@ -53,14 +55,20 @@ ARM = """
 </mujoco>
 """
 LEFT, RIGHT, HIT = [-0.5, 0.0], [0.5, 0.0], [0.0, 0.0]
-ABSTRACT = config.TrainConfig, config.SegmentTraining
+ABSTRACT = TrainConfig, SegmentTraining
 SMALL = PlannerConfig(max_expansions=500)
+
+
+def settings(kind: type = Checked) -> set[type]:
+    """All classes of settings that the package has."""
+    below = {deeper for sub in kind.__subclasses__() for deeper in settings(sub)}
+    return {kind, *below}
+
+
 CONFIGS = [
     kind()
-    for kind in vars(config).values()
-    if isinstance(kind, type)
-    and dataclasses.is_dataclass(kind)
-    and kind not in ABSTRACT
+    for kind in sorted(settings(), key=lambda kind: kind.__name__)
+    if kind.__module__.startswith("jaxplan.") and kind not in (Checked, *ABSTRACT)
 ]
 FIELDS = [
     pytest.param(c, f.name, id=f"{type(c).__name__}.{f.name}")

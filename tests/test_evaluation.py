@@ -7,7 +7,6 @@ from scipy.stats import binomtest
 
 from jaxplan.episodes import EpisodeRecord
 from jaxplan.evaluation import parse_seeds, versions, wilson
-from jaxplan.evaluation.closed_loop import episode_json
 from jaxplan.evaluation.toggle_error import ToggleError, summarize
 
 
@@ -60,7 +59,7 @@ def test_toggle_errors_are_summed_up_per_toggle():
 
 
 def test_an_episode_that_never_moved_is_a_record_too():
-    episode = episode_json(EpisodeRecord(5, False, "outside", []))
+    episode = EpisodeRecord(5, False, "outside", []).as_json()
     assert episode["expansions"] == episode["planning_seconds"] == 0
     assert episode["failure"] == "outside"
 

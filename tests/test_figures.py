@@ -11,7 +11,7 @@ sys.path.append(str(Path(__file__).parents[1] / "eval"))
 from figures import legend, small
 from pictures.sheet import blank, sheet
 
-from jaxplan.tasks.mug import painter
+from jaxplan.pictures import painter
 
 
 def test_panels_stand_in_rows_with_room_for_words():

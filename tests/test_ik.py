@@ -12,14 +12,9 @@ import pytest
 from jaxplan import Pose, Scene, make_world
 from jaxplan.collision import XLA_OPTIONS
 from jaxplan.collision.kinematics import frame_jacobian, frame_pose
-from jaxplan.ik import (
-    SAME,
-    Limits,
-    inverse_kinematics,
-    inverse_kinematics_batch,
-    limits_of,
-)
+from jaxplan.ik import Limits, inverse_kinematics, inverse_kinematics_batch
 from jaxplan.ik.descent import LANES
+from jaxplan.ik.inverse import SAME, limits_of
 
 ARM = """
 <mujoco>

@@ -21,7 +21,14 @@ from planning_spheres import (
 )
 
 from jaxplan.config import PAPER_PLANNER
-from jaxplan.planning import PlanResult, Segment, Status, lanes, make_planner, search
+from jaxplan.planning import (
+    PlanResult,
+    Segment,
+    Status,
+    ends,
+    lanes,
+    make_planner,
+)
 from jaxplan.planning.edges import (
     STAGES,
     all_free,
@@ -69,7 +76,7 @@ def _grown(config, d):
         )
 
     def begin(query):
-        query, status = search.examine(query, space)
+        query, status = ends.examine(query, space)
         empty = lanes.empty(query, len(status), space, config)
         new = jnp.array(True)
         return lanes.begin(empty, new, query, status, space, config), query, status
