@@ -233,7 +233,7 @@ def _longest(scenes: Sequence[Scene], stage: int) -> Scene:
 
 
 def _proposals(paint: Painter, propose: LearnedProposals, scene: Scene) -> np.ndarray:
-    """Nodes (N, d) that a sampler proposes for a recorded phase."""
+    """Nodes `[N, d]` that a sampler proposes for a recorded phase."""
     phase, seen = scene.phase, scene.phase.observation
     keys = jax.vmap(jax.random.key)(jnp.arange(len(seen.q)))
     draw = propose(seen, None, phase.action.decision.subgoal, keys)
@@ -241,7 +241,7 @@ def _proposals(paint: Painter, propose: LearnedProposals, scene: Scene) -> np.nd
 
 
 def _way(paint: Painter, scene: Scene) -> np.ndarray:
-    """(N, 3) where the executed motion brings the tool centre point [m]."""
+    """`[N, 3]` where the executed motion brings the tool centre point [m]."""
     motion = scene.phase.action.q[scene.lane]
     return np.stack([paint.tcp(q) for q in motion[::2]])
 

@@ -41,7 +41,7 @@ def test_parts_of_a_card_add_up(collection):
     assert described["succeeded"] == 7
     assert described["failures"] == {"the mug is outside the box": 1}
     assert sum(described["frames_by_toggle"].values()) == len(shard.q)
-    for parts in described["success_by_pose"].values():
+    for parts in described["success_by_start"].values():
         solved, made = zip(
             *(map(int, p.split("/")) for p in parts.values()), strict=True
         )

@@ -16,6 +16,7 @@ def make_shard(seed: int = 0, frames: int = 6, paths: int = 2) -> data.Shard:
         gripper_toggle=rng.integers(0, 2, frames),
         q_goal=rng.normal(size=(frames, 7)),
         toggle=rng.integers(0, 4, frames),
+        camera_error=np.zeros((frames, 5)),
         seed=np.full(frames, seed),
         path=rng.integers(-1, paths, frames),
         arc=rng.uniform(size=frames),

@@ -13,14 +13,13 @@ PACKAGE = Path(jaxplan.__file__).parent
 # Each part may import itself and what stands in an earlier line.
 LAYERS = (
     {"base", "interrupt", "process", "ranges"},
-    {"config", "provenance"},
+    {"config", "episodes", "provenance"},
     {"scene", "planning", "trajectory", "diffusion"},
     {"collision", "robots"},
     {"data", "ik", "networks", "simulation"},
     {"learning", "motion"},
     {"samplers"},
     {"pretrained", "tasks"},
-    {"episodes"},
     {"algorithm1"},
     {"demonstrations", "learned", "pictures"},
     {"evaluation"},

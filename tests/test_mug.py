@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from jaxplan import tasks
 from jaxplan.base import Action
 from jaxplan.config import PAPER_PLANNER
 from jaxplan.robots import PANDA
@@ -188,3 +189,14 @@ def move(task, q, close=None):
 
 def mug_in_hand(task):
     return np.linalg.inv(task.hand_pose(task.sim.data[0])) @ task.object_pose(0)
+
+
+def test_unknown_names_are_refused():
+    for settings, line in (
+        (("cup",), "task 'cup': there is mug"),
+        (("mug", 1, "shelf"), "variant 'shelf' of mug: plain or cluttered"),
+        (("mug", 1, "plain", "top"), "camera 'top': there is static or hand"),
+    ):
+        with pytest.raises(ValueError, match=line):
+            tasks.load(*settings, **({} if len(settings) > 1 else {"batch": 1}))
+    assert tasks.names() == ["mug"]

@@ -33,7 +33,7 @@ def build(ours, other):
 
 
 class Pick(tasks.Tabletop):
-    def __init__(self, batch, variant, camera, friction):
+    def __init__(self, batch, variant, camera, friction, perturbation):
         models = build(PHYSICS, PLANNING), build(PLANNING, PHYSICS)
         allowed = {
             (how, at): ALLOWED for how in ("free", "held") for at in (False, True)
@@ -47,7 +47,7 @@ class Pick(tasks.Tabletop):
             pose = np.eye(4)
             pose[:3, 3] = PLACE
             pose[1, 3] += np.random.default_rng(seed).uniform(-0.1, 0.1)
-            self.begin(lane, pose)
+            self.begin(lane, seed, pose)
 
     def keyframes(self, lane, q):
         place, (_, down) = self.object_pose(lane)[:3, 3], self.ik.pose(PANDA.q_home)

@@ -30,6 +30,7 @@ def demonstrations(episodes: int = 8, frames: int = 4) -> data.Shard:
         q_goal=q_goal[episode],
         toggle=np.zeros(count),
         seed=episode,
+        camera_error=0.01 * rng.normal(size=(count, 5)),
         path=np.where(np.arange(count) % frames == frames - 1, data.NO_PATH, episode),
         arc=part[:, 0] * length[episode],
         path_q=path_q,

@@ -1,4 +1,4 @@
-"""A data set's card: what is randomised, counts, the expert's success by pose, size.
+"""A data set's card: what is randomised, counts, the expert's success by start, size.
 
 `collect_demos.py` writes `CARD.md` and `card.json` beside the shards; everything in them is read
 back from the shards and their manifest.
@@ -13,12 +13,11 @@ import numpy as np
 
 from jaxplan import data
 from jaxplan.data import TOGGLES, Shard, read_manifest, write_atomic
-from jaxplan.tasks.mug.poses import RANGE, sample_pose
+from jaxplan.tasks import TASKS
+from jaxplan.tasks.starts import Starts
 
 BINS = 3
 """Along each coordinate of the pose."""
-PITCH = round(float(np.degrees(RANGE.pitch)), 1)
-ROLL = round(float(np.degrees(RANGE.roll)), 1)
 
 
 def write_card(directory: Path) -> None:
@@ -37,22 +36,17 @@ def describe(shard: Shard, settings: dict[str, Any]) -> dict[str, Any]:
     """What the shards of a collection hold, JSON-ready."""
     success = shard.episode_success
     failures = Counter(str(f) for f in shard.episode_failure[~success])
+    starts = TASKS[settings["task"].split("_")[0]].starts
+    randomised = starts.described() if starts else {}
     noisy = settings["demonstration"]["noisy_episodes"]
+    randomised["share of episodes driven beside their labels"] = noisy
     return {
         "settings": settings,
-        "randomised": {
-            "x [m]": list(RANGE.x),
-            "y [m]": list(RANGE.y),
-            "direction of the opening [deg]": np.degrees(RANGE.yaw).round(1).tolist(),
-            "side of the handle": ["left", "right"],
-            "handle off its resting place [deg]": [0.0, ROLL],
-            "pitch [deg]": [-PITCH, PITCH],
-            "share of episodes driven beside their labels": noisy,
-        },
+        "randomised": randomised,
         "episodes": len(success),
         "succeeded": int(success.sum()),
         "failures": dict(failures.most_common()),
-        "success_by_pose": success_by_pose(shard.episode_seed, success),
+        "success_by_start": success_by_start(starts, shard.episode_seed, success),
         "frames": len(shard.q),
         "frames_by_toggle": {
             name: int((shard.toggle == i).sum()) for i, name in enumerate(TOGGLES)
@@ -62,33 +56,25 @@ def describe(shard: Shard, settings: dict[str, Any]) -> dict[str, Any]:
     }
 
 
-def success_by_pose(
-    seeds: np.ndarray, success: np.ndarray
+def success_by_start(
+    starts: Starts | None, seeds: np.ndarray, success: np.ndarray
 ) -> dict[str, dict[str, str]]:
-    """`succeeded/episodes` in equal parts of each coordinate from which the mug is dropped."""
-    poses = [sample_pose(int(seed)) for seed in seeds]
-    position = np.array([p for p, _ in poses])
-    axis = np.array([r[:, 2] for _, r in poses])
-    handle = np.array([r[:, 0] for _, r in poses])
-    yaw = np.degrees(np.arctan2(axis[:, 1], axis[:, 0]))
-    left = np.einsum("ij,ij->i", np.cross([0.0, 0.0, 1.0], axis), handle) > 0
-    columns = {
-        "x [m]": (position[:, 0], RANGE.x),
-        "y [m]": (position[:, 1], RANGE.y),
-        "direction of the opening [deg]": (yaw, tuple(np.degrees(RANGE.yaw))),
-    }
+    """`succeeded/episodes` in equal parts of each coordinate that is drawn, and of each choice."""
+    if starts is None:
+        return {}
+    drawn = [starts.of(int(seed)) for seed in seeds]
     rows: dict[str, dict[str, str]] = {}
-    for name, (value, (low, high)) in columns.items():
+    for name, (low, high) in starts.ranges.items():
         edges = np.linspace(low, high, BINS + 1)
+        value = np.array([start[name] for start in drawn])
         part = np.clip(np.digitize(value, edges) - 1, 0, BINS - 1)
         rows[name] = {
             f"{edges[k]:.4g} to {edges[k + 1]:.4g}": _share(success[part == k])
             for k in range(BINS)
         }
-    rows["side of the handle"] = {
-        "left": _share(success[left]),
-        "right": _share(success[~left]),
-    }
+    for name, words in starts.choices.items():
+        chosen = np.array([start[name] for start in drawn])
+        rows[name] = {word: _share(success[chosen == word]) for word in words}
     return rows
 
 
@@ -107,7 +93,7 @@ def as_markdown(card: dict[str, Any]) -> str:
         *_table("Frames before", "number", card["frames_by_toggle"]),
         *_table("Failure", "episodes", card["failures"]),
     ]
-    for name, parts in card["success_by_pose"].items():
+    for name, parts in card["success_by_start"].items():
         lines += _table(name, "succeeded", parts)
     return "\n".join(lines)
 

@@ -19,6 +19,7 @@ from jaxplan import data, tasks
 from jaxplan.cli import run_script
 from jaxplan.demonstrations import DemonstrationConfig, ExpertAgent, Recorder
 from jaxplan.episodes import run_episodes
+from jaxplan.tasks.perturbation import NOMINAL, Perturbation
 
 
 @dataclass(frozen=True)
@@ -35,6 +36,8 @@ class Args:
     variant: str = "plain"
     workers: int = field(default_factory=lambda: os.cpu_count() or 1)
     """Processes, each making one shard at a time. The bytes do not depend on it."""
+    perturbation: Perturbation = NOMINAL
+    """What varies in the pictures."""
     demonstration: DemonstrationConfig = DemonstrationConfig()
 
 
@@ -43,7 +46,13 @@ class Collector:
 
     def __init__(self, args: Args) -> None:
         self._args = args
-        self._task = tasks.load(args.task, args.shard_size, args.variant, args.camera)
+        self._task = tasks.load(
+            args.task,
+            args.shard_size,
+            args.variant,
+            args.camera,
+            perturbation=args.perturbation,
+        )
         self._expert = ExpertAgent(self._task, args.demonstration)
 
     def shard(self, index: int) -> tuple[int, int]:
@@ -84,6 +93,7 @@ def main(args: Args) -> None:
         "first_seed": args.first_seed,
         "shard_size": args.shard_size,
         "camera": args.camera,
+        "perturbation": dataclasses.asdict(args.perturbation),
         "demonstration": dataclasses.asdict(args.demonstration),
     }
     args.out.mkdir(parents=True, exist_ok=True)

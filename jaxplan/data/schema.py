@@ -39,6 +39,8 @@ class Shard(NamedTuple):
     """i8 [F], index into `TOGGLES` of the toggle that comes next."""
     seed: np.ndarray
     """i32 [F], the episode's seed."""
+    camera_error: np.ndarray
+    """f32 [F, 5], how the camera was off its mount: yaw, pitch [rad], right, up, back [m]."""
     path: np.ndarray
     """i32 [F], row of the path that the frame lies on; `NO_PATH` = none."""
     arc: np.ndarray
@@ -64,6 +66,7 @@ _ROWS: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "q_goal": (np.float32, ("d",)),
     "toggle": (np.int8, ()),
     "seed": (np.int32, ()),
+    "camera_error": (np.float32, (5,)),
     "path": (np.int32, ()),
     "arc": (np.float32, ()),
     "path_q": (np.float32, (PATH_POINTS, "d")),
@@ -73,7 +76,7 @@ _ROWS: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "episode_failure": (np.str_, ()),
 }
 """Types and shapes of rows; d joints."""
-_TABLES = (Shard._fields[:10], Shard._fields[10:12], Shard._fields[12:])
+_TABLES = (Shard._fields[:11], Shard._fields[11:13], Shard._fields[13:])
 
 
 def as_shard(**columns: np.ndarray | list) -> Shard:

@@ -13,7 +13,7 @@ from jaxplan.demonstrations.expert import DemonstrationConfig, ExpertAgent
 from jaxplan.episodes import EpisodeRecord
 from jaxplan.tasks import Tabletop
 
-FRAME = ("image", "q", "gripper", *Subgoal._fields, "toggle", "seed")
+FRAME = ("image", "q", "gripper", *Subgoal._fields, "toggle", "seed", "camera_error")
 """A shard's columns that each frame fills."""
 
 
@@ -90,6 +90,7 @@ class Recorder:
             *label,
             self._expert.keyframes(lane).toggle,
             self._seeds[lane],
+            self._task.eyes.error(lane),
         )
         self._frames[lane].append(dict(zip(FRAME, values, strict=True)))
         # A noisy episode was driven beside the label; the sampler learns the way to the label.

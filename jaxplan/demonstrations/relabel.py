@@ -43,6 +43,7 @@ class Relabeler:
                 keyframes.q[following],
                 keyframes.toggle,
                 self._seeds[e],
+                self._task.eyes.error(e),
             )
             self._frames.append(dict(zip(FRAME, values, strict=True)))
 

@@ -26,6 +26,7 @@ from jaxplan.learning import Weights
 from jaxplan.motion import MotionPlanner
 from jaxplan.provenance import versions
 from jaxplan.simulation.physics import CONTROL_PERIOD
+from jaxplan.tasks.perturbation import NOMINAL, Perturbation
 
 
 @dataclasses.dataclass(frozen=True)
@@ -46,6 +47,8 @@ class ClosedLoopConfig:
     """Denoising steps; None: the sampler's own number, 25 for DDIM."""
     friction: float = 1.0
     """Factor on all friction; 0 shows that grasps hold by friction alone."""
+    perturbation: Perturbation = NOMINAL
+    """What varies in the pictures."""
     prediction_noise: float = 0.0
     """Standard deviation of noise on each joint of what the upper network says [rad]."""
 
@@ -70,7 +73,12 @@ class ClosedLoop:
             )
         self.config, self._weights = config, weights
         self.task = tasks.load(
-            config.task, config.batch, config.variant, config.camera, config.friction
+            config.task,
+            config.batch,
+            config.variant,
+            config.camera,
+            config.friction,
+            config.perturbation,
         )
         self.learned = learned(self.task, weights, config.inference_steps)
         self.planner = MotionPlanner(
@@ -81,6 +89,11 @@ class ClosedLoop:
         )
         # One phase of one episode compiles all, so that no planning time includes it.
         self._episodes([0], EpisodeConfig(max_phases=1))
+
+    def perturb(self, perturbation: Perturbation) -> None:
+        """Lets other things vary in the pictures from now on; nothing compiles anew."""
+        self.config = dataclasses.replace(self.config, perturbation=perturbation)
+        self.task.eyes.perturbation = perturbation
 
     def run(
         self,
@@ -104,14 +117,18 @@ class ClosedLoop:
             JSON-ready: success_rate, wilson_95, episodes, toggle_error, config, versions.
         """
         assert memo is None or (predict is None and listen is None)
-        measured = ToggleErrors(self.task)
-        listeners = [measured] if listen is None else [measured, listen]
+        measured, watch = ToggleErrors(self.task), self.task.watch()
+        listeners = [measured, watch, *([] if listen is None else [listen])]
 
         def piece(part: Sequence[int]) -> dict[str, Any]:
             start = time.perf_counter()
             records = self._episodes(part, self.config.episode, predict, listeners)
             seconds = time.perf_counter() - start
-            episodes = [record.as_json() for record in records]
+            kinds = watch.finish(records)
+            episodes = [
+                record.as_json() | {"kind": kind}
+                for record, kind in zip(records, kinds, strict=True)
+            ]
             return {
                 "episodes": episodes,
                 "errors": measured.finish(),

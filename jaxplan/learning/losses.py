@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import optax
 
 from jaxplan.base import Subgoal
-from jaxplan.networks import Prediction
+from jaxplan.networks import ERROR_SCALE, Prediction
 from jaxplan.ranges import Checked, NotNegative, Positive
 
 
@@ -19,6 +19,8 @@ class LossConfig(Checked):
     w_g: NotNegative = 1.0
     w_s: NotNegative = 1.0
     w_r: NotNegative = 1e-4
+    w_c: NotNegative = 1.0
+    """Of the camera's error, where the network says it; not in the paper."""
     huber_kappa: Positive = 2.0
     lambda_lim: NotNegative = 1.0
     lambda_prox: NotNegative = 0.5
@@ -27,11 +29,18 @@ class LossConfig(Checked):
 
 
 def subgoal_loss(
-    config: LossConfig, prediction: Prediction, targets: Subgoal
+    config: LossConfig,
+    prediction: Prediction,
+    targets: Subgoal,
+    camera_error: jax.Array | None = None,
 ) -> tuple[jax.Array, dict[str, jax.Array]]:
     """Equation 1, averaged over the batch, and its terms before weighting.
 
-    Joints, also those of `targets`, are scaled to [-1, 1].
+    Args:
+        config: Weights.
+        prediction: Of the network; joints are scaled to [-1, 1].
+        targets: Labels, likewise.
+        camera_error: [B, 5] labels, for a network that says it.
     """
     terms = {
         "toggle": huber(prediction.q_toggle - targets.q_toggle, config.huber_kappa),
@@ -41,7 +50,11 @@ def subgoal_loss(
         "goal": huber(prediction.q_goal - targets.q_goal, config.huber_kappa),
         "regularizer": regularizer(config, prediction.q_toggle, prediction.q_goal),
     }
-    weights = (config.w_q, config.w_g, config.w_s, config.w_r)
+    weights = [config.w_q, config.w_g, config.w_s, config.w_r]
+    if prediction.camera_error is not None and camera_error is not None:
+        off = (prediction.camera_error - camera_error) / ERROR_SCALE
+        terms["camera"] = huber(off, config.huber_kappa)
+        weights.append(config.w_c)
     means = {name: jnp.mean(term) for name, term in terms.items()}
     total = jnp.dot(jnp.array(weights), jnp.stack(list(means.values())))
     return total, means

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 from typing import Any, NamedTuple
 
 import jax
@@ -15,7 +14,13 @@ from jaxplan.learning.augment import AugmentConfig, photometric
 from jaxplan.learning.loop import Metrics, TrainConfig
 from jaxplan.learning.losses import LossConfig, subgoal_loss
 from jaxplan.learning.train_state import Params
-from jaxplan.networks import Predictor, PredictorConfig, normalize, predict
+from jaxplan.networks import (
+    Predictor,
+    PredictorConfig,
+    as_subgoal,
+    normalize,
+    predict,
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,6 +45,7 @@ class Frames(NamedTuple):
     q_toggle: jax.Array
     gripper_toggle: jax.Array
     q_goal: jax.Array
+    camera_error: jax.Array
 
 
 def gather(shard: Shard, rows: np.ndarray) -> Frames:
@@ -72,20 +78,27 @@ def loss(
         batch.gripper_toggle,
         normalize(batch.q_goal, *limits),
     )
-    return subgoal_loss(config.loss, prediction, targets)
+    return subgoal_loss(config.loss, prediction, targets, batch.camera_error)
 
 
 def validation(
     config: PredictorConfig, shard: Shard, rows: np.ndarray
 ) -> Callable[[Params], Metrics]:
-    """Errors over frames `rows`: L2 over the joints [rad], per toggle, and the gripper."""
-    run = jax.jit(partial(predict, config))
+    """Errors over frames `rows`: L2 over the joints [rad], per toggle, gripper and camera."""
+
+    @jax.jit
+    def run(params: Params, frames: Frames) -> tuple[Subgoal, jax.Array | None]:
+        inputs = frames.image, frames.q, frames.gripper
+        prediction: Any = Predictor(config).apply(params, *inputs)
+        return as_subgoal(config, prediction), prediction.camera_error
 
     def validate(params: Params) -> Metrics:
-        toggle, goal, gripper = [], [], []
+        toggle, goal, gripper, camera = [], [], [], []
         for part in batches(rows, VALIDATION_BATCH):
             frames = gather(shard, part)
-            subgoal, _ = run(params, frames.image, frames.q, frames.gripper)
+            subgoal, error = run(params, frames)
+            if error is not None:
+                camera.append(np.abs(np.asarray(error) - frames.camera_error))
             toggle.append(np.linalg.norm(subgoal.q_toggle - frames.q_toggle, axis=-1))
             goal.append(np.linalg.norm(subgoal.q_goal - frames.q_goal, axis=-1))
             gripper.append(np.asarray(subgoal.gripper_toggle) == frames.gripper_toggle)
@@ -93,7 +106,14 @@ def validation(
         toggle, goal, gripper = (
             np.concatenate(part)[: len(rows)] for part in (toggle, goal, gripper)
         )
-        return summary(toggle, goal, gripper, shard.toggle[rows])
+        metrics = summary(toggle, goal, gripper, shard.toggle[rows])
+        if camera:
+            off = np.median(np.concatenate(camera)[: len(rows)], axis=0)
+            axes = "yaw", "pitch", "right", "up", "back"
+            metrics |= {
+                f"camera_{axis}": float(x) for axis, x in zip(axes, off, strict=True)
+            }
+        return metrics
 
     return validate
 

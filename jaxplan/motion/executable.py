@@ -181,7 +181,7 @@ def _straight(
     acceleration: np.ndarray,
     period: float,
 ) -> np.ndarray:
-    """Samples of a straight rest-to-rest motion but its end: (T, d), empty if q0 is q1."""
+    """Samples of a straight rest-to-rest motion but its end: `[T, d]`, empty if q0 is q1."""
     distance = np.abs(q1 - q0)
     # Peaks of the quintic time law: 15/8 of the mean velocity, 10/sqrt(3) d / T^2.
     duration = max(

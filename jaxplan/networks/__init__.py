@@ -6,6 +6,7 @@ from jaxplan.networks.cvae import CvaeConfig as CvaeConfig
 from jaxplan.networks.cvae import CvaeNetwork as CvaeNetwork
 from jaxplan.networks.gan import GanConfig as GanConfig
 from jaxplan.networks.gan import GanNetwork as GanNetwork
+from jaxplan.networks.hand_camera import ERROR_SCALE as ERROR_SCALE
 from jaxplan.networks.hand_camera import HandCameraConfig as HandCameraConfig
 from jaxplan.networks.joints import normalize as normalize
 from jaxplan.networks.joints import unnormalize as unnormalize

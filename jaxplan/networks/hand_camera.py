@@ -6,19 +6,23 @@ where on the table a keypoint lies.
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 
 from jaxplan.ranges import Checked, Number, Positive
-from jaxplan.robots.panda.mount import FLANGE, HAND_TURN, LINKS, MOUNT
+from jaxplan.robots import ROBOTS
+from jaxplan.robots.panda.mount import MOUNT
 
 
 @dataclass(frozen=True)
 class HandCameraConfig(Checked):
-    """How the hand's camera is mounted on a Panda, and what plane its rays are cut with."""
+    """How the hand's camera is mounted, and what plane its rays are cut with."""
 
+    robot: str = "panda"
+    """Whose hand it is (`robots.ROBOTS`)."""
     position: tuple[Number, Number, Number] = MOUNT.position
     """In the hand's frame [m]."""
     tilt: Number = MOUNT.tilt
@@ -34,33 +38,60 @@ class HandCameraConfig(Checked):
     """Half of its extent [m]."""
 
 
-def camera_pose(config: HandCameraConfig, q: jax.Array) -> tuple[jax.Array, jax.Array]:
-    """Position [..., 3] [m] and axes (columns right, up, back) [..., 3, 3] at `q` [..., d]."""
+ERROR_SCALE = jnp.array([0.2, 0.2, 0.02, 0.02, 0.02])
+"""In which a camera's error is said and judged [rad, m]."""
+
+
+def camera_pose(
+    config: HandCameraConfig, q: jax.Array, error: jax.Array | None = None
+) -> tuple[jax.Array, jax.Array]:
+    """Where the camera is.
+
+    Args:
+        config: Mount and lens.
+        q: [..., d] [rad].
+        error: [..., 5] how it is off its mount: yaw, pitch [rad], then right, up, back [m].
+
+    Returns:
+        Position [..., 3] [m] and axes (columns right, up, back) [..., 3, 3].
+    """
+    chain = ROBOTS[config.robot].chain
     rotation = jnp.broadcast_to(jnp.eye(3), (*q.shape[:-1], 3, 3))
     position = jnp.zeros((*q.shape[:-1], 3))
-    for joint, (a, d, alpha) in enumerate(LINKS):
+    for joint, (a, d, alpha) in enumerate(chain.links):
         twist = _about_x(alpha)
         position = position + rotation @ (jnp.array([a, 0.0, 0.0]) + d * twist[:, 2])
         rotation = rotation @ twist @ _about_z(q[..., joint])
-    hand = rotation @ _about_z(jnp.array(HAND_TURN))
-    offset = jnp.array(config.position) + jnp.array([0.0, 0.0, FLANGE])
+    hand = rotation @ _about_z(jnp.array(chain.turn))
+    offset = jnp.array(config.position) + jnp.array([0.0, 0.0, chain.flange])
     # The turn is about z, so the flange's offset may be taken in the hand's frame.
-    return position + hand @ offset, hand @ _mount(config.tilt)
+    position, axes = position + hand @ offset, hand @ _mount(config.tilt)
+    if error is None:
+        return position, axes
+    turn = _about_y(error[..., 0]) @ _about_x(error[..., 1])
+    shift = jnp.squeeze(axes @ error[..., 2:, None], -1)
+    return position + shift, axes @ turn
 
 
-def on_plane(config: HandCameraConfig, image: jax.Array, q: jax.Array) -> jax.Array:
+def on_plane(
+    config: HandCameraConfig,
+    image: jax.Array,
+    q: jax.Array,
+    error: jax.Array | None = None,
+) -> jax.Array:
     """Where rays through image points meet the plane `config.plane` above the table.
 
     Args:
         config: Mount and lens.
         image: [..., K, 2], x to the right and y down, both in [-1, 1].
         q: [..., d] [rad].
+        error: [..., 5] as for `camera_pose`.
 
     Returns:
         [..., K, 2], x and y in the world, about `config.centre` in units of `config.scale`,
         inside [-3, 3]: a ray near the horizon ends there.
     """
-    position, axes = camera_pose(config, q)
+    position, axes = camera_pose(config, q, error)
     x, y = jnp.split(image, 2, axis=-1)
     half = np.tan(np.radians(config.fovy) / 2)
     rays = jnp.concatenate([x * half * config.aspect, -y * half, -jnp.ones_like(x)], -1)
@@ -78,18 +109,31 @@ def _mount(tilt: float) -> np.ndarray:
     return np.stack([right, np.cross(back, right), back], 1)
 
 
-def _about_x(angle: float) -> np.ndarray:
-    c, s = np.cos(angle), np.sin(angle)
-    return np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]])
+Angle = float | jax.Array
+"""A constant in double precision, or what is computed; one matrix, or [...] of them."""
 
 
-def _about_z(angle: jax.Array) -> jax.Array:
+def _about_x(angle: Angle) -> Any:
     """[...] to [..., 3, 3]."""
-    c, s, zero, one = (
-        jnp.cos(angle),
-        jnp.sin(angle),
-        jnp.zeros_like(angle),
-        jnp.ones_like(angle),
-    )
-    rows = [c, -s, zero, s, c, zero, zero, zero, one]
-    return jnp.stack(rows, -1).reshape(*angle.shape, 3, 3)
+    xp, c, s, zero, one = _parts(angle)
+    return _matrix(xp, [one, zero, zero, zero, c, -s, zero, s, c])
+
+
+def _about_y(angle: Angle) -> Any:
+    xp, c, s, zero, one = _parts(angle)
+    return _matrix(xp, [c, zero, s, zero, one, zero, -s, zero, c])
+
+
+def _about_z(angle: Angle) -> Any:
+    xp, c, s, zero, one = _parts(angle)
+    return _matrix(xp, [c, -s, zero, s, c, zero, zero, zero, one])
+
+
+def _parts(angle: Angle) -> tuple[Any, ...]:
+    """NumPy or JAX, cosine, sine, 0 and 1."""
+    xp: Any = jnp if isinstance(angle, jax.Array) else np
+    return xp, xp.cos(angle), xp.sin(angle), xp.zeros_like(angle), xp.ones_like(angle)
+
+
+def _matrix(xp: Any, rows: list[Any]) -> Any:
+    return xp.stack(rows, -1).reshape(*rows[0].shape, 3, 3)

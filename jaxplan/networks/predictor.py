@@ -8,7 +8,12 @@ import jax
 import jax.numpy as jnp
 
 from jaxplan.base import Subgoal
-from jaxplan.networks.hand_camera import HandCameraConfig, camera_pose, on_plane
+from jaxplan.networks.hand_camera import (
+    ERROR_SCALE,
+    HandCameraConfig,
+    camera_pose,
+    on_plane,
+)
 from jaxplan.networks.joints import normalize, unnormalize
 from jaxplan.networks.resnet import Encoder, EncoderConfig
 from jaxplan.ranges import Checked, Count, Number, Probability
@@ -22,6 +27,9 @@ class PredictorConfig(Checked):
     encoder: EncoderConfig = EncoderConfig()
     camera: HandCameraConfig | None = None
     """Adds where on the table the keypoints lie, by way of the joints; None = as in the paper."""
+    calibrates: bool = False
+    """A head of its own says how the camera is off its mount, and rays are cut with the corrected
+    pose; needs `camera`."""
     state_features: Count = 64
     hidden: Count = 256
     dropout: Probability = 0.1
@@ -40,6 +48,8 @@ class Prediction(NamedTuple):
     """[..., d]."""
     features: jax.Array
     """[..., F], the encoder's image features."""
+    camera_error: jax.Array | None = None
+    """[..., 5] how the camera is off its mount: yaw, pitch [rad], then right, up, back [m]."""
 
 
 class Predictor(nn.Module):
@@ -57,10 +67,19 @@ class Predictor(nn.Module):
         state = state_vector(q, gripper, config.q_min, config.q_max)
         for _ in range(2):
             state = nn.relu(nn.Dense(config.state_features)(state))
-        inputs = [nn.LayerNorm()(features), state]
+        inputs, error = [nn.LayerNorm()(features), state], None
+        if config.calibrates:
+            places = keypoints.reshape(*q.shape[:-1], -1)
+            h = jnp.concatenate([*inputs, places], axis=-1)
+            for k in range(2):
+                h = nn.relu(nn.Dense(config.hidden, name=f"camera_hidden{k}")(h))
+            # Begins with the camera as it is mounted.
+            still = nn.initializers.zeros_init()
+            h = nn.Dense(len(ERROR_SCALE), kernel_init=still, name="camera_error")(h)
+            error = ERROR_SCALE * h
         if config.camera is not None:
-            points = on_plane(config.camera, keypoints, q)
-            position, axes = camera_pose(config.camera, q)
+            points = on_plane(config.camera, keypoints, q, error)
+            position, axes = camera_pose(config.camera, q, error)
             columns = points, position, axes
             inputs += [x.reshape(*q.shape[:-1], -1) for x in columns]
         shared = jnp.concatenate(inputs, axis=-1)
@@ -79,6 +98,7 @@ class Predictor(nn.Module):
             gripper_logit=head(1, "gripper_toggle")[..., 0],
             q_goal=head(joints, "q_goal"),
             features=features,
+            camera_error=error,
         )
 
 

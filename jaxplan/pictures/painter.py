@@ -32,7 +32,7 @@ class Mark(NamedTuple):
     """Something drawn over a picture, in sight even where it lies behind the hand."""
 
     position: np.ndarray
-    """(3,) [m]."""
+    """`[3]` [m]."""
     shape: str
     """dot, disc or cross."""
     color: Color
@@ -99,7 +99,7 @@ class Painter:
             count: N, how many segments.
 
         Returns:
-            Configurations (N, d) [rad].
+            Configurations `[N, d]` [rad].
         """
         motion = phase.action.decision.motion
         lanes, banks, drawn = len(motion.q), [], 0
@@ -117,7 +117,7 @@ class Painter:
         return np.asarray(segment.end).clip(*self._limits)
 
     def dots(self, nodes: np.ndarray) -> tuple[Mark, ...]:
-        """Where proposed nodes (N, d) [rad] bring the tool centre point."""
+        """Where proposed nodes `[N, d]` [rad] bring the tool centre point."""
         return tuple(Mark(self.tcp(q), "dot", PROPOSAL) for q in nodes)
 
     def picture(self, moment: Moment, around: np.ndarray | None = None) -> Image.Image:
@@ -125,7 +125,7 @@ class Painter:
 
         Args:
             moment: What is drawn.
-            around: Points (N, 3) [m]; only the part of the picture about them is shown.
+            around: Points `[N, 3]` [m]; only the part of the picture about them is shown.
         """
         self._data.qpos[:] = moment.qpos
         mujoco.mj_forward(self._model, self._data)
@@ -133,7 +133,7 @@ class Painter:
         marks = (*moment.proposals, *moment.targets)
         if marks:
             places = self._camera.project(np.array([m.position for m in marks]))
-            picture = _marked(picture, marks, places, self._scale)
+            picture = marked(picture, marks, places, self._scale)
         if around is not None:
             picture = picture.crop(_window(self._camera.project(around), picture.size))
         if moment.seen is not None:
@@ -144,14 +144,14 @@ class Painter:
         return picture
 
     def tcp(self, q: np.ndarray) -> np.ndarray:
-        """The tool centre point (3,) of joints (d,) [rad]."""
+        """The tool centre point `[3]` of joints `[d]` [rad]."""
         return self._kinematics.pose(q)[0]
 
 
-def _marked(
+def marked(
     picture: Image.Image, marks: tuple[Mark, ...], places: np.ndarray, scale: int
 ) -> Image.Image:
-    """The picture with marks at pixels (N, 2); dots let through what is below."""
+    """The picture with marks at pixels `[N, 2]`; dots let through what is below."""
     over = Image.new("RGBA", picture.size)
     draw = ImageDraw.Draw(over)
     for mark, (x, y) in zip(marks, places, strict=True):
@@ -172,7 +172,7 @@ def _marked(
 
 
 def _window(places: np.ndarray, size: tuple[int, int]) -> tuple[int, int, int, int]:
-    """Left, top, right and bottom of the part about pixels (N, 2), in the picture's shape."""
+    """Left, top, right and bottom of the part about pixels `[N, 2]`, in the picture's shape."""
     low, high = places.min(0), places.max(0)
     room = np.maximum(0.12 * np.array(size), 0.3 * (high - low))
     share = max(0.4, *((high - low + 2 * room) / size))

@@ -45,8 +45,8 @@ class InverseKinematics:
         """Solves for a pose of the tool centre point.
 
         Args:
-            position: Target [m], shape (3,).
-            rotation: Target axes as columns, shape (3, 3).
+            position: Target [m], shape `[3]`.
+            rotation: Target axes as columns, shape `[3, 3]`.
             q_reference: Where the continuation starts and what the null space prefers [rad].
             step: Longest stride of the continuation [0.4 m or rad].
             settle: Iterations at the target.
@@ -82,7 +82,7 @@ class InverseKinematics:
         rotation: np.ndarray,
         q_reference: np.ndarray,
     ) -> tuple[np.ndarray, np.ndarray]:
-        """One damped step toward a pose; also the error (6,) before it [m, rad]."""
+        """One damped step toward a pose; also the error `[6]` before it [m, rad]."""
         p, r = self.pose(q)
         mujoco.mj_comPos(self._model, self._data)
         mujoco.mj_jacSite(

@@ -38,6 +38,31 @@ class Gripper(NamedTuple):
     """Fingers nearer than this to the middle hold nothing [m]."""
 
 
+class Mount(NamedTuple):
+    """Where the camera is on the hand, and its lens."""
+
+    position: tuple[float, float, float]
+    """In the hand's frame [m]."""
+    tilt: float
+    """About the hand's y, from straight ahead [rad]."""
+    fovy: float
+    """Vertical field of view [deg]."""
+    height: int
+    width: int
+    """Of its image [px]."""
+
+
+class Chain(NamedTuple):
+    """The joints from the base to the hand, for who knows the joints and not the model."""
+
+    links: tuple[tuple[float, float, float], ...]
+    """Craig's (a [m], d [m], alpha [rad]) of each joint."""
+    flange: float
+    """From the last joint to the hand's frame along z [m]."""
+    turn: float
+    """And about z [rad]."""
+
+
 class Robot(NamedTuple):
     """An arm with a parallel gripper and a camera on its hand.
 
@@ -51,6 +76,8 @@ class Robot(NamedTuple):
     gripper: Gripper
     q_home: np.ndarray
     """`[d]` the hand over the table, looking down [rad]."""
+    chain: Chain
+    mount: Mount
     fingers: int = 2
     hand: str = "hand"
     """Body of the hand."""

@@ -88,12 +88,19 @@ class Camera:
     def render(
         self, data: mujoco.MjData, camera: str | int | mujoco.MjvCamera
     ) -> np.ndarray:
-        """Image (height, width, 3) uint8 from a camera."""
+        """Image `[height, width, 3]` uint8 from a camera."""
         self._renderer.update_scene(data, camera, self._options)
         return self._renderer.render()
 
+    def upload_texture(self, texture: int) -> None:
+        """Shows a texture of the model as its data are now."""
+        renderer = self._renderer
+        if renderer._gl_context:
+            renderer._gl_context.make_current()
+        mujoco.mjr_uploadTexture(renderer.model, renderer._mjr_context, texture)
+
     def project(self, points: np.ndarray) -> np.ndarray:
-        """Where points (N, 3) [m] are in the image that was last rendered, (N, 2) [px].
+        """Where points `[N, 3]` [m] are in the image that was last rendered, `[N, 2]` [px].
 
         Column and row, also of what lies behind something; points must be before the camera.
         """

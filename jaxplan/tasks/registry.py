@@ -4,8 +4,11 @@ from collections.abc import Callable
 from typing import Any, NamedTuple, get_args
 
 from jaxplan.robots import PANDA
+from jaxplan.tasks.mug.poses import STARTS
 from jaxplan.tasks.mug.scene import Variant
 from jaxplan.tasks.mug.task import MugTask
+from jaxplan.tasks.perturbation import NOMINAL, Perturbation
+from jaxplan.tasks.starts import Starts
 from jaxplan.tasks.tabletop import Tabletop, full_name
 
 
@@ -13,14 +16,16 @@ class TaskEntry(NamedTuple):
     """How a task is made."""
 
     make: Callable[..., Tabletop]
-    """(batch, variant=..., camera=..., friction=...)."""
+    """(batch, variant=..., camera=..., friction=..., perturbation=...)."""
     variants: tuple[str, ...]
     """Of its scene; the first is the plain one."""
     robot: str
     """Whose arm it is for."""
+    starts: Starts | None = None
+    """What is drawn at random at the start of an episode."""
 
 
-TASKS = {"mug": TaskEntry(MugTask, get_args(Variant), PANDA.name)}
+TASKS = {"mug": TaskEntry(MugTask, get_args(Variant), PANDA.name, STARTS)}
 
 
 DEFAULT = "mug"
@@ -38,6 +43,7 @@ def load(
     variant: str = "plain",
     camera: str = "hand",
     friction: float = 1.0,
+    perturbation: Perturbation = NOMINAL,
 ) -> Tabletop:
     """A batch of episodes of a task.
 
@@ -47,12 +53,17 @@ def load(
         variant: Of the scene.
         camera: Which one takes the pictures.
         friction: Factor on all friction; 0 shows that grasps hold by friction alone.
+        perturbation: What varies in the pictures.
 
     Raises:
         ValueError: There is no such task, or no such variant of it.
     """
     check(name, variant)
-    settings: dict[str, Any] = {"camera": camera, "friction": friction}
+    settings: dict[str, Any] = {
+        "camera": camera,
+        "friction": friction,
+        "perturbation": perturbation,
+    }
     return TASKS[name].make(batch, variant=variant, **settings)
 
 

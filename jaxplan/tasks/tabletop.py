@@ -19,9 +19,11 @@ from jaxplan.motion import MotionPlanner
 from jaxplan.robots import Robot
 from jaxplan.robots.kinematics import InverseKinematics
 from jaxplan.scene import Scene
-from jaxplan.simulation.camera import Camera
 from jaxplan.simulation.physics import Simulator
+from jaxplan.tasks.eyes import Eyes
+from jaxplan.tasks.perturbation import NOMINAL, Perturbation
 from jaxplan.tasks.poses import from_matrix, to_matrix
+from jaxplan.tasks.watch import Watch
 
 RETREAT = 0.10
 """How far the hand backs off along its own axis after a release [m]."""
@@ -46,6 +48,11 @@ class Tabletop(ABC):
         batch: Number of episodes side by side.
         camera: Which one takes the pictures.
         image: Its rows and columns [px].
+        perturbation: What varies in the pictures.
+        look: What they are taken of, with the model's joints; the model itself where None.
+
+    Raises:
+        ValueError: There is no such camera.
     """
 
     def __init__(
@@ -59,6 +66,8 @@ class Tabletop(ABC):
         batch: int,
         camera: str,
         image: tuple[int, int],
+        perturbation: Perturbation = NOMINAL,
+        look: mujoco.MjModel | None = None,
     ) -> None:
         self.name, self.robot, self.model, self.batch = name, robot, model, batch
         self.camera = camera
@@ -66,8 +75,8 @@ class Tabletop(ABC):
         self.closed = np.zeros(batch, bool)
         self.planning_scene = Scene.from_mjcf(planning)
         self._kinematics = InverseKinematics(robot, model)
-        self._image = image
-        self._camera: Camera | None = None
+        look = model if look is None else look
+        self.eyes = Eyes(model, look, camera, image, batch, perturbation)
         self._pads = {model.geom(pad).id for pad in robot.pads}
         self._body = model.body(movable).id
         start = int(model.jnt_qposadr[model.body_jntadr[self._body]])
@@ -84,6 +93,10 @@ class Tabletop(ABC):
         """The planner of demonstrations, and of recorded problems."""
         config = replace(PAPER_PLANNER, p_uniform=1.0)
         return MotionPlanner(self.planning_scene, self.robot.limits, config)
+
+    def watch(self) -> Watch:
+        """Who tells failures by kind."""
+        return Watch()
 
     @abstractmethod
     def reset(self, lanes: Sequence[int], seeds: Sequence[int]) -> None:
@@ -105,15 +118,16 @@ class Tabletop(ABC):
     def keyframes(self, lane: int, q: np.ndarray) -> Keyframes:
         """The expert's way from joints `q` [rad] to the next toggle. Privileged."""
 
-    def begin(self, lane: int, pose: np.ndarray) -> None:
-        """Arm at home, gripper open, the object at a pose (4, 4)."""
+    def begin(self, lane: int, seed: int, pose: np.ndarray) -> None:
+        """Arm at home, gripper open, the object at a pose `[4, 4]`."""
+        self.eyes.begin(lane, seed)
         data = self.sim.data[lane]
         mujoco.mj_resetDataKeyframe(self.model, data, 0)
         data.qpos[self.object_slice] = from_matrix(pose)
         self.closed[lane] = self._narrow[lane] = False
 
     def object_pose(self, lane: int) -> np.ndarray:
-        """Of the object in the world, (4, 4).
+        """Of the object in the world, `[4, 4]`.
 
         Privileged: for the expert, the collision world and the judge.
         """
@@ -128,7 +142,7 @@ class Tabletop(ABC):
         """Renders the camera and reads joints and gripper mode."""
         image, q, gripper = self._blank()
         for e in lanes:
-            image[e] = self._render(self.sim.data[e])
+            image[e] = self.eyes.picture(e, self.sim.data[e])
             q[e], gripper[e] = self.sim.q(e), self.closed[e]
         return Observation({self.camera: image}, q, gripper)
 
@@ -149,17 +163,21 @@ class Tabletop(ABC):
             pose = self.hand_pose(data) @ in_hand @ self.object_pose(lane)
             data.qpos[self.object_slice] = from_matrix(pose)
         mujoco.mj_forward(self.model, data)
-        return self._render(data), np.asarray(q, np.float32)
+        return self.eyes.picture(lane, data), np.asarray(q, np.float32)
 
     def hand_pose(self, data: mujoco.MjData) -> np.ndarray:
-        """Pose of the hand's frame in the world, (4, 4)."""
+        """Pose of the hand's frame in the world, `[4, 4]`."""
         pose, hand = np.eye(4), data.body(self.robot.hand)
         pose[:3, 3], pose[:3, :3] = hand.xpos, hand.xmat.reshape(3, 3)
         return pose
 
     def tcp(self, lane: int) -> np.ndarray:
-        """The tool centre point, (3,) [m]."""
+        """The tool centre point, `[3]` [m]."""
         return self.sim.data[lane].site(self.robot.tcp).xpos
+
+    def tcp_at(self, q: np.ndarray) -> np.ndarray:
+        """Where joints `[d]` [rad] bring it, `[3]` [m]."""
+        return self._kinematics.pose(q)[0]
 
     def pads_touching(self, lane: int) -> int:
         """How many of the two pads touch the object."""
@@ -244,14 +262,9 @@ class Tabletop(ABC):
 
     def _blank(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         lanes = self.batch
-        image = np.zeros((lanes, *self._image, 3), np.uint8)
+        image = np.zeros((lanes, *self.eyes.image, 3), np.uint8)
         q = np.zeros((lanes, self.robot.dof), np.float32)
         return image, q, np.zeros(lanes, np.uint8)
-
-    def _render(self, data: mujoco.MjData) -> np.ndarray:
-        if self._camera is None:
-            self._camera = Camera(self.model, *self._image)
-        return self._camera.render(data, self.camera)
 
     def _world(self, lane: int, touching: bool) -> tuple[np.ndarray, ...]:
         """The leaves of an episode's `World`."""

@@ -46,7 +46,7 @@ class Toggle(IntEnum):
 
 
 Approach = tuple[list[np.ndarray], np.ndarray]
-"""Poses (4, 4) of the tool centre point, the toggle's last, and the reference of their IK [rad]."""
+"""Poses `[4, 4]` of the tool centre point, the toggle's last, and their IK's reference [rad]."""
 
 
 class Expert:
@@ -57,7 +57,7 @@ class Expert:
         self._shape = shape
 
     def next_toggle(self, mug: np.ndarray, q: np.ndarray, closed: bool) -> Toggle:
-        """Which event comes next, for a mug pose (4, 4), joints [rad] and gripper."""
+        """Which event comes next, for a mug pose `[4, 4]`, joints [rad] and gripper."""
         if not closed:
             return Toggle.GRASP2 if mug[2, 2] > 0.9 else Toggle.GRASP1
         position, _ = self._ik.pose(q)
@@ -73,7 +73,7 @@ class Expert:
         pre-contact, toggle.
 
         Args:
-            mug: Pose of the mug in the world, (4, 4).
+            mug: Pose of the mug in the world, `[4, 4]`.
             q: Joints at the start [rad]; with a closed gripper they tell how the mug is held.
             closed: Whether the gripper is closed.
         """

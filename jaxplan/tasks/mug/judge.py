@@ -12,7 +12,7 @@ HAND_CLEAR = 0.05
 
 
 def in_terminal_region(tcp: np.ndarray, closed: bool) -> bool:
-    """Q_term: gripper open, tool centre point (3,) low over the target box [m]."""
+    """Q_term: gripper open, tool centre point `[3]` low over the target box [m]."""
     over_box = np.all(np.abs(tcp[:2] - BOX_POSITION[:2]) < BOX_INNER + 0.02)
     return bool(not closed and over_box and tcp[2] < 0.12)
 
@@ -23,9 +23,9 @@ def failure(
     """Why an episode that is over is no success; None if the mug stands in the box.
 
     Args:
-        mug: Its pose, (4, 4).
+        mug: Its pose, `[4, 4]`.
         speed: Of its centre [m/s].
-        tcp: The tool centre point, (3,) [m].
+        tcp: The tool centre point, `[3]` [m].
         closed: Whether the gripper is closed.
         touching: Whether a pad touches the mug.
     """

@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from jaxplan.tasks.mug.mug import MugShape
+from jaxplan.tasks.starts import Starts
 
 
 class MugRange(NamedTuple):
@@ -45,7 +46,7 @@ def sample_pose(
 
 
 def in_range(mug: np.ndarray) -> bool:
-    """Whether a pose (4, 4) lies in `RANGE`, with a centimetre and two degrees of slack."""
+    """Whether a pose `[4, 4]` lies in `RANGE`, with a centimetre and two degrees of slack."""
     yaw = np.arctan2(mug[1, 2], mug[0, 2])
     inside = [
         low - slack <= value <= high + slack
@@ -56,3 +57,37 @@ def in_range(mug: np.ndarray) -> bool:
         )
     ]
     return bool(all(inside) and abs(mug[2, 2]) < 0.1)
+
+
+def start_of(seed: int) -> dict[str, float | str]:
+    """Of a seed, by the names in `STARTS`."""
+    position, rotation = sample_pose(seed)
+    axis, handle = rotation[:, 2], rotation[:, 0]
+    left = np.cross([0.0, 0.0, 1.0], axis) @ handle > 0
+    return {
+        "x [m]": float(position[0]),
+        "y [m]": float(position[1]),
+        "direction of the opening [deg]": float(
+            np.degrees(np.arctan2(axis[1], axis[0]))
+        ),
+        "side of the handle": "left" if left else "right",
+    }
+
+
+PITCH, ROLL = (round(float(np.degrees(a)), 1) for a in (RANGE.pitch, RANGE.roll))
+STARTS = Starts(
+    ranges={
+        "x [m]": RANGE.x,
+        "y [m]": RANGE.y,
+        "direction of the opening [deg]": (
+            float(np.degrees(RANGE.yaw[0])),
+            float(np.degrees(RANGE.yaw[1])),
+        ),
+    },
+    choices={"side of the handle": ("left", "right")},
+    others={
+        "handle off its resting place [deg]": [0.0, ROLL],
+        "pitch [deg]": [-PITCH, PITCH],
+    },
+    of=start_of,
+)

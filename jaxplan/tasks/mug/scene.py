@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from jaxplan.robots import PANDA
-from jaxplan.robots.panda.mount import MOUNT
+from jaxplan.tasks.look import AWAY, DISTRACTOR, TEXTURED
 from jaxplan.tasks.mug.clutter import add_clutter
 from jaxplan.tasks.mug.mug import STIFF_CONTACT, MugShape, add_mug
 
@@ -16,7 +16,7 @@ BOX_POSITION = np.array([0.45, -0.36, 0.0])
 BOX_INNER, BOX_WALL, BOX_HEIGHT, BOX_FLOOR = 0.085, 0.005, 0.04, 0.004
 """Half of the inner side, half of the wall's thickness, height and floor thickness [m]."""
 
-IMAGE_HEIGHT, IMAGE_WIDTH = MOUNT.height, MOUNT.width
+IMAGE_HEIGHT, IMAGE_WIDTH = PANDA.mount.height, PANDA.mount.width
 
 Kind = Literal["physics", "planning"]
 Variant = Literal["plain", "cluttered"]
@@ -39,6 +39,36 @@ def build(
     (the arm's spheres among others) in group 4, and what only the camera sees in group 2.
     """
     return spec(kind, shape, variant).compile()
+
+
+def look(shape: MugShape = MugShape(), variant: Variant = "plain") -> mujoco.MjModel:
+    """How the scene of physics looks, with a textured table and a distractor for who asks for them.
+
+    Joints are those of physics.
+    """
+    scene = spec("physics", shape, variant)
+    scene.add_texture(
+        name=TEXTURED,
+        type=mujoco.mjtTexture.mjTEXTURE_2D,
+        builtin=mujoco.mjtBuiltin.mjBUILTIN_CHECKER,
+        rgb1=[0.9, 0.9, 0.9],
+        rgb2=[0.55, 0.55, 0.55],
+        width=256,
+        height=256,
+    )
+    textured = scene.add_material(
+        name=TEXTURED, rgba=[0.76, 0.67, 0.54, 1], specular=0.1, texrepeat=[12, 12]
+    )
+    textured.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = TEXTURED
+    scene.add_material(name=DISTRACTOR, rgba=[0.75, 0.2, 0.15, 1], specular=0.3)
+    thing = scene.worldbody.add_body(name=DISTRACTOR, pos=AWAY, mocap=True)
+    can, block = mujoco.mjtGeom.mjGEOM_CYLINDER, mujoco.mjtGeom.mjGEOM_BOX
+    for kind, size, pos in (
+        (can, [0.033, 0.06, 0], [0, 0, 0.06]),
+        (block, [0.05, 0.03, 0.02], [0.08, 0, 0.02]),
+    ):
+        thing.add_geom(type=kind, size=size, pos=pos, material=DISTRACTOR, **VISUAL)
+    return scene.compile()
 
 
 def spec(
@@ -145,12 +175,14 @@ def _add_box(scene: mujoco.MjSpec) -> None:
 
 def _add_cameras(scene: mujoco.MjSpec) -> None:
     """Adds `hand`, on the wrist, looking past the fingers, and `static`, in front of the table."""
-    tilt = MOUNT.tilt
+    mount = PANDA.mount
     scene.body(PANDA.hand).add_camera(
         name="hand",
-        pos=MOUNT.position,
-        fovy=MOUNT.fovy,
-        quat=_camera_quat(forward=[-np.sin(tilt), 0, np.cos(tilt)], up=[-1, 0, 0]),
+        pos=mount.position,
+        fovy=mount.fovy,
+        quat=_camera_quat(
+            forward=[-np.sin(mount.tilt), 0, np.cos(mount.tilt)], up=[-1, 0, 0]
+        ),
     )
     target, eye = np.array([0.3, -0.05, 0.22]), np.array([1.5, -0.85, 0.9])
     scene.worldbody.add_camera(

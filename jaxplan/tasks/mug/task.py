@@ -10,7 +10,9 @@ from jaxplan.robots import PANDA
 from jaxplan.tasks.mug import judge, poses, scene
 from jaxplan.tasks.mug.expert import Expert
 from jaxplan.tasks.mug.mug import MugShape
+from jaxplan.tasks.mug.watch import MugWatch
 from jaxplan.tasks.mug.way import expert_planner
+from jaxplan.tasks.perturbation import NOMINAL, Perturbation
 from jaxplan.tasks.tabletop import Tabletop, full_name
 
 SETTLE = 0.8
@@ -26,6 +28,7 @@ class MugTask(Tabletop):
         friction: Factor on all friction; 0 shows that grasps hold by friction alone.
         shape: Sizes of the mug.
         variant: `plain`, or `cluttered` with obstacles across most straight lines.
+        perturbation: What varies in the pictures.
 
     Raises:
         ValueError: There is no such variant.
@@ -38,6 +41,7 @@ class MugTask(Tabletop):
         friction: float = 1.0,
         shape: MugShape = MugShape(),
         variant: scene.Variant = "plain",
+        perturbation: Perturbation = NOMINAL,
     ) -> None:
         model = scene.build("physics", shape, variant)
         model.geom_friction *= friction
@@ -51,6 +55,8 @@ class MugTask(Tabletop):
             batch,
             camera,
             (scene.IMAGE_HEIGHT, scene.IMAGE_WIDTH),
+            perturbation,
+            scene.look(shape, variant),
         )
         self.shape = shape
         self.variant: scene.Variant = variant
@@ -60,6 +66,10 @@ class MugTask(Tabletop):
         """The planner of demonstrations, and of recorded problems."""
         return expert_planner(self.planning_scene, self.variant)
 
+    def watch(self) -> MugWatch:
+        """Who tells failures by kind."""
+        return MugWatch(self)
+
     def reset(self, lanes: Sequence[int], seeds: Sequence[int]) -> None:
         """Starts episodes: arm at home, gripper open, mug dropped and come to rest.
 
@@ -68,7 +78,7 @@ class MugTask(Tabletop):
         for lane, seed in zip(lanes, seeds, strict=True):
             pose = np.eye(4)
             pose[:3, 3], pose[:3, :3] = poses.sample_pose(seed, self.shape)
-            self.begin(lane, pose)
+            self.begin(lane, seed, pose)
         self.wait(lanes, SETTLE)
 
     def unfit(self, lane: int) -> str | None:
