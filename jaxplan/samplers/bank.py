@@ -45,22 +45,35 @@ class Bank:
 
     @cached_property
     def _draw(self) -> Any:
-        params = self._made[0].params
+        return jax.jit(self._drawn, compiler_options=XLA_OPTIONS)
 
-        def drawn(cond: Cond, keys: jax.Array, number: jax.Array) -> Segment:
-            keys = jax.vmap(jax.random.fold_in)(keys, number)
-            return draw(self.config, params, cond, keys, self.size)
+    @cached_property
+    def _draw_each(self) -> Any:
+        """One problem after the other: a network at another batch size differs in the last bits."""
 
-        return jax.jit(drawn, compiler_options=XLA_OPTIONS)
+        def one(asked: Any) -> Segment:
+            alone = self._drawn(*jax.tree.map(lambda leaf: leaf[None], asked))
+            return jax.tree.map(lambda leaf: leaf[0], alone)
 
-    def of(self, cond: Cond, keys: jax.Array) -> DrawBank:
+        def each(cond: Cond, keys: jax.Array, number: jax.Array) -> Segment:
+            return jax.lax.map(one, (cond, keys, number))
+
+        return jax.jit(each, compiler_options=XLA_OPTIONS)
+
+    def _drawn(self, cond: Cond, keys: jax.Array, number: jax.Array) -> Segment:
+        keys = jax.vmap(jax.random.fold_in)(keys, number)
+        return draw(self.config, self._made[0].params, cond, keys, self.size)
+
+    def of(self, cond: Cond, keys: jax.Array, alike: bool = False) -> DrawBank:
         """Banks of P problems, with fresh noise for each number.
 
         Args:
             cond: Conditions, leaves `[P, ...]`.
             keys: Typed, `[P]`. A problem's segments depend on its own key and condition only.
+            alike: To the last bit, whatever P is; slower where P is large.
         """
-        return lambda number: self._draw(cond, keys, jnp.asarray(number))
+        program = self._draw_each if alike else self._draw
+        return lambda number: program(cond, keys, jnp.asarray(number))
 
     def seeing(
         self,
@@ -108,4 +121,4 @@ class Seeing:
             gripper_toggle=each(np.int32(self.gripper_toggle)),
             q_goal=jnp.asarray(q_goal),
         )
-        return self.bank.of(cond, keys)
+        return self.bank.of(cond, keys, alike=True)

@@ -1,0 +1,66 @@
+"""Table 5's script: what it makes of results, and of names that it does not know."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+sys.path.append(str(Path(__file__).parents[1] / "eval"))
+
+from robustness import PAPER, SETTINGS, summary, table
+
+from jaxplan.evaluation.tables import markdown
+
+ROOT = Path(__file__).parents[1]
+
+
+def result(kinds: list[str | None]) -> dict:
+    """Of a closed loop, an episode a kind of failure; None succeeded."""
+    successes = sum(kind is None for kind in kinds)
+    return {
+        "success_rate": successes / len(kinds),
+        "wilson_95": [0.1, 0.9],
+        "successes": successes,
+        "trials": len(kinds),
+        "toggle_error": {"mean": 0.03, "median": 0.01, "nearest_toggle_mean": 0.02},
+        "episodes": [{"success": kind is None, "kind": kind} for kind in kinds],
+        "seconds": 1.0,
+    }
+
+
+def test_failures_are_counted_by_kind():
+    found = summary(result([None, "dropped", "missed rim", "dropped", None]))
+    assert found["failures"] == {"dropped": 2, "missed rim": 1}
+    assert (found["successes"], found["trials"]) == (2, 5)
+    assert found["toggle_error_nearest"] == 0.02
+    text = markdown(table({"mild": found, "colours": found}))
+    assert "dropped 2, missed rim 1" in text
+    assert f"| {PAPER['mild']} " in text
+
+
+def test_the_paper_s_settings_are_there():
+    assert {*PAPER} <= {*SETTINGS}
+    assert SETTINGS["nominal"].nothing
+    assert not any(SETTINGS[name].nothing for name in SETTINGS if name != "nominal")
+    assert SETTINGS["mild, each query"].each_query
+
+
+@pytest.mark.parametrize(
+    ("arguments", "line"),
+    [
+        (["--settings", "wild"], "no setting 'wild': there are nominal, mild"),
+        (["--variant", "shelf"], "variant 'shelf' of mug: plain or cluttered"),
+        (["--weights", "nowhere"], "missing weights: no nowhere/manifest.json"),
+    ],
+)
+def test_bad_input_is_one_line(arguments, line):
+    done = subprocess.run(
+        [sys.executable, "eval/robustness.py", *arguments],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == 2
+    assert done.stderr.startswith(f"error: {line}")
+    assert done.stderr.count("\n") == 1
