@@ -80,7 +80,8 @@ NOTHING = ("a", None, (), {}, object(), 1j, np.ones(2), b"1")
 RANGES = {"more than 0": (0, -1), "0 or more": (-1e-9, -1), "at least 1e-6": (0, -1),
           "at least 1e-6, or 0": (1e-9, -1), "0 to 1": (-0.1, 1.1),
           "more than 0, at most 1": (0, 1.1), "1 to 2^31 - 1": (0, 2**31),
-          "0 to 2^31 - 1": (-1, 2**31), "finite": ()}  # fmt: skip
+          "0 to 2^31 - 1": (-1, 2**31), "finite": (),
+          "0 to 45": (-0.1, 46), "0 to 0.1": (-0.1, 0.2)}  # fmt: skip
 """Numbers just outside each range."""
 
 

@@ -95,11 +95,13 @@ def test_a_calibrating_network_begins_with_the_camera_as_it_is_mounted():
     training = PredictorTraining(network=config)
     frames = predictor.gather(demonstrations(), np.arange(4))
     params = predictor.init(config, jax.random.key(0), frames)
-    said = Predictor(config).apply(params, frames.image, frames.q, frames.gripper)
+    said = jax.jit(Predictor(config).apply)(
+        params, frames.image, frames.q, frames.gripper
+    )
     np.testing.assert_array_equal(said.camera_error, 0)
     plain = PredictorConfig(encoder, CONFIG, dropout=0.0)
     weights = {k: v for k, v in params["params"].items() if not k.startswith("camera_")}
-    other = Predictor(plain).apply(
+    other = jax.jit(Predictor(plain).apply)(
         {"params": weights}, frames.image, frames.q, frames.gripper
     )
     np.testing.assert_allclose(other.q_toggle, said.q_toggle, atol=1e-5)
@@ -107,6 +109,6 @@ def test_a_calibrating_network_begins_with_the_camera_as_it_is_mounted():
     def value(params):
         return predictor.loss(training, params, jax.random.key(1), frames)
 
-    (_, terms), slope = jax.value_and_grad(value, has_aux=True)(params)
+    (_, terms), slope = jax.jit(jax.value_and_grad(value, has_aux=True))(params)
     assert terms["camera"] > 0
     assert np.abs(slope["params"]["camera_error"]["kernel"]).max() > 0

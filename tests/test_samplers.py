@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxplan import Planner, samplers
+from jaxplan import Planner, Scene, samplers
 from jaxplan.config import PAPER_PLANNER
 from jaxplan.networks import Cond, CvaeConfig, FewStepConfig, GanConfig, SamplerConfig
 from jaxplan.pretrained import load_weights
@@ -124,20 +124,22 @@ def test_few_steps_part_the_teachers_way():
         few_step.timesteps(FewStepConfig(num_inference_steps=97))
 
 
-def test_trained_weights_guide_the_public_planner(mug_task):
+def test_trained_weights_guide_the_public_planner():
     """By a bank under one observation: alone, in a batch and in a copy the same answer."""
     weights = load_weights("sampler")
     features = weights.params["params"]["condition"]["image_norm"]["scale"].shape
-    mug_task.reset([0], [0])
-    world = jax.tree.map(lambda leaf: leaf[0], mug_task.worlds(np.ones(4, bool)))
-    (goal, *_), q = mug_task.keyframes(0, PANDA.q_home).q, PANDA.q_home
+    spec, q = PANDA.spec(), PANDA.q_home
+    for geom in [geom for geom in spec.geoms if geom.group == 3]:  # physics
+        spec.delete(geom)
+    spec.worldbody.add_geom(size=[0.05] * 3, pos=[0.5, -0.3, 0.5], conaffinity=4)
+    goal = q + np.array([0.5, 0.6, 0.0, 0.3, 0.2, 0.0, 0.0])
     sampler = Bank(weights).seeing(np.zeros(features, np.float32), 0, 1)
-    config = replace(PAPER_PLANNER, method="rrt", goal_bias=0.0)
-    planner = Planner(mug_task.planning_scene, config, sampler=sampler)
-    alone = planner.plan(q, goal, seed=3, world=world)
+    config = replace(PAPER_PLANNER, method="rrt", goal_bias=0.2)
+    planner = Planner(Scene.from_mjcf(spec), config, sampler=sampler)
+    alone = planner.plan(q, goal, seed=3)
     assert alone.solved, alone.reason
-    batch = planner.plan_batch([q] * 3, [goal] * 3, [1, 3, 2], world)
-    copy = pickle.loads(pickle.dumps(planner)).plan(q, goal, seed=3, world=world)
+    batch = planner.plan_batch([q] * 3, [goal] * 3, [1, 3, 2])
+    copy = pickle.loads(pickle.dumps(planner)).plan(q, goal, seed=3)
     for again in (batch[1], copy):
         np.testing.assert_array_equal(again.path, alone.path)
     with pytest.raises(ValueError, match="num_inference_steps 4: CvaeConfig has none"):
