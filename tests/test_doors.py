@@ -551,10 +551,10 @@ BUSY = {
 def test_ctrl_c_is_one_line_at_once(busy):
     code = f"""
 import sys
-from jaxplan.cli import Check, run_script
+from jaxplan.cli import CheckCommand, run_script
 def main(_):{busy}
 sys.argv[1:] = ["robot.xml"]
-run_script(main, Check)
+run_script(main, CheckCommand)
 """
     assert run(code, interrupt=True) == (130, "busy\n", "interrupted\n")
 
