@@ -34,6 +34,7 @@ LATE = "not finished after 24 phases"
             "the mug is not upright",
             "knocked over",
         ),
+        ([LYING, RIM, STANDING], "the mug is outside the box", "missed handle"),
         ([LYING], "the mug came to rest outside the range", "the mug came to rest"),
     ],
 )

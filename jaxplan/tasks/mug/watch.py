@@ -80,6 +80,6 @@ def kind(seen: Sequence[Seen], failure: str | None) -> str | None:
         return "knocked over"
     if grasps >= 2 and not last.closed:
         return "missed box"
-    if empty:
-        return "missed handle"
-    return kind_of(failure)
+    words = kind_of(failure)
+    # Judged as over with the mug where it was put upright: the hand went on without it.
+    return "missed handle" if empty or words == failure else words
