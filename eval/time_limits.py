@@ -2,8 +2,8 @@
 
     python eval/time_limits.py --out runs/time_limits.json
 
-A wall stands between start and goal of the table, from before the base to beyond the arm's
-reach: the way leads over the arm's own back, if there is one. Seed after seed.
+A wall stands between start and goal of the table, on both sides of the base and above it: all of
+the arm would have to be in the gap at once. Seed after seed.
 """
 
 import json
@@ -26,7 +26,13 @@ from jaxplan.evaluation.motion_bench import (
     table,
 )
 
-WALL = Obstacle("box", [0.9, 0.005, 1.5], [1.15, 0.0, 0.5, 1, 0, 0, 0])
+WALL = (
+    Obstacle("box", [1.0, 0.005, 1.5], [1.15, 0.0, 0.5, 1, 0, 0, 0]),
+    Obstacle("box", [1.0, 0.005, 1.5], [-1.15, 0.0, 0.5, 1, 0, 0, 0]),
+    Obstacle("box", [0.15, 0.005, 0.7], [0.0, 0.0, 1.3, 1, 0, 0, 0]),
+)
+ASIDE = 0.6
+"""Start and goal are turned away from the wall by this [rad]."""
 
 
 @dataclass(frozen=True)
@@ -44,11 +50,13 @@ class Args:
 def main(args: Args) -> None:
     """Measures, prints, writes JSON."""
     problem = table()
-    obstacles = (*problem.obstacles[:1], WALL)
+    obstacles = (*problem.obstacles[:1], *WALL)
     model = robot_mjcf(read_robot(args.data), obstacles_mjcf(obstacles))
     scene = Scene.from_mjcf(model)
     planner = Planner(scene, PlannerConfig(max_expansions=1_000_000))
-    ends = problem.q_start, problem.q_goal
+    ends = [problem.q_start.copy(), problem.q_goal.copy()]
+    ends[0][0] += ASIDE
+    ends[1][0] -= ASIDE
     planner.plan(*ends, time_limit=60.0)  # compiles
     seconds, statuses = [], Counter()
     for seed in tqdm(range(args.problems), unit="problem"):

@@ -16,7 +16,7 @@ KINDS = ("sphere", "capsule", "ellipsoid", "cylinder", "box", "mesh")
 SLOTS = KINDS[:-1]
 
 
-class Drawn(NamedTuple):
+class DrawnScene(NamedTuple):
     """A scene as text, and what `Scene.from_mjcf` is told about it."""
 
     mjcf: str
@@ -34,7 +34,7 @@ class Drawn(NamedTuple):
         return Scene.from_mjcf(*self)
 
 
-def random_scene(seed: int, most: int = 14) -> Drawn:
+def random_scene(seed: int, most: int = 14) -> DrawnScene:
     """Draws a scene, the same for the same seed, of at most so many joints."""
     return _Maker(seed).scene(most)
 
@@ -75,7 +75,7 @@ class _Maker:
         self.bodies: list[str] = []
         self.meshes, self.ties = "", ""
 
-    def scene(self, most: int) -> Drawn:
+    def scene(self, most: int) -> DrawnScene:
         """All of it."""
         rng = self.rng
         count = min(most, int(rng.integers(1, rng.choice([4, 8, 15]))))
@@ -113,7 +113,7 @@ class _Maker:
             f"<asset>{self.meshes}</asset><worldbody>{world}</worldbody>"
             f"<contact>{contact}</contact><equality>{self.ties}</equality></mujoco>"
         )
-        return Drawn(mjcf, tuple(self.joints), hand, slots, exclude)
+        return DrawnScene(mjcf, tuple(self.joints), hand, slots, exclude)
 
     def arm(self, count: int, aside: float) -> str:
         """A line of bodies with branches, `count` joints in all."""

@@ -52,7 +52,7 @@ class Mount(NamedTuple):
     """Of its image [px]."""
 
 
-class Chain(NamedTuple):
+class HandChain(NamedTuple):
     """The joints from the base to the hand, for who knows the joints and not the model."""
 
     links: tuple[tuple[float, float, float], ...]
@@ -76,7 +76,7 @@ class Robot(NamedTuple):
     gripper: Gripper
     q_home: np.ndarray
     """`[d]` the hand over the table, looking down [rad]."""
-    chain: Chain
+    chain: HandChain
     mount: Mount
     fingers: int = 2
     hand: str = "hand"

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from jaxplan.robots.robot import Chain, Mount
+from jaxplan.robots.robot import HandChain, Mount
 
-CHAIN = Chain(
+CHAIN = HandChain(
     links=(
         (0.0, 0.333, 0.0),
         (0.0, 0.0, -np.pi / 2),
