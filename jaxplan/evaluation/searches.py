@@ -13,10 +13,9 @@ import numpy as np
 
 from jaxplan.config import PlannerConfig
 from jaxplan.evaluation.problems import Problems
-from jaxplan.ik import Limits
 from jaxplan.learning import Weights
 from jaxplan.learning.predictor import image_features
-from jaxplan.motion import Search
+from jaxplan.motion.search import sampled_search
 from jaxplan.networks import Cond
 from jaxplan.planning import DrawBank, Segment, Status
 from jaxplan.robots import JointLimits
@@ -132,8 +131,7 @@ class Searcher:
         self, scene: Scene, config: PlannerConfig, limits: JointLimits
     ) -> None:
         config = dataclasses.replace(config, lanes=LANES)
-        joints = Limits(limits.q_min, limits.q_max, np.zeros(len(limits.q_min), bool))
-        self._plan = Search(scene, config, joints, proven=False)()
+        self._plan = sampled_search(scene, config, limits)()
 
     def __call__(
         self, problems: Problems, rows: np.ndarray, banks: KeptBanks | None = None

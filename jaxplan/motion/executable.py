@@ -19,8 +19,7 @@ from jaxplan.config import (
     PlannerConfig,
     TrajectoryConfig,
 )
-from jaxplan.ik import Limits
-from jaxplan.motion.search import Search
+from jaxplan.motion.search import sampled_search
 from jaxplan.planning import DrawBank, PlanResult
 from jaxplan.robots import JointLimits
 from jaxplan.scene import Scene
@@ -66,8 +65,7 @@ class MotionPlanner:
         self.scene, self.limits = scene, limits
         self._trajectory = trajectory
 
-        joints = Limits(limits.q_min, limits.q_max, np.zeros(len(limits.q_min), bool))
-        search = Search(scene, planner, joints, proven=False)
+        search = sampled_search(scene, planner, limits)
         self._config_free, self.search = search.free_rows, search()
         self._offsets = _neighbours(len(limits.q_min))
 

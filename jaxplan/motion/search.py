@@ -12,9 +12,18 @@ from jaxplan.collision import World
 from jaxplan.config import PlannerConfig
 from jaxplan.ik import Limits
 from jaxplan.planning import PlanResult, make_planner
+from jaxplan.robots import JointLimits
 from jaxplan.scene import Scene
 
 jit: Any = partial(jax.jit, compiler_options=collision.XLA_OPTIONS)
+
+
+def sampled_search(
+    scene: Scene, config: PlannerConfig, limits: JointLimits
+) -> "Search":
+    """Of a robot's arm, whose joints all have limits; paths are checked at samples."""
+    joints = Limits(limits.q_min, limits.q_max, np.zeros(len(limits.q_min), bool))
+    return Search(scene, config, joints, proven=False)
 
 
 class Search:

@@ -1,5 +1,8 @@
 """The pictures that a batch of episodes is seen by, as they are or perturbed."""
 
+from collections.abc import Callable
+from functools import cached_property
+
 import mujoco
 import numpy as np
 
@@ -16,7 +19,7 @@ class Eyes:
 
     Args:
         model: Of physics.
-        look: What perturbed pictures are taken of, with the model's joints.
+        look: Makes what perturbed pictures are taken of, with the model's joints.
         camera: By name.
         image: Rows and columns [px].
         batch: B, how many lanes there are.
@@ -29,7 +32,7 @@ class Eyes:
     def __init__(
         self,
         model: mujoco.MjModel,
-        look: mujoco.MjModel,
+        look: Callable[[], mujoco.MjModel],
         camera: str,
         image: tuple[int, int],
         batch: int,
@@ -41,10 +44,15 @@ class Eyes:
         self.name, self.image, self.perturbation = camera, image, perturbation
         self.drawn: list[Drawn | None] = [None] * batch
         """What the last picture of each lane varied by: what a calibration should say."""
-        self._model, self._look = model, Look(look, camera, image, REACH)
+        self._model, self._make_look = model, look
         self._camera: Camera | None = None
         self._last: Camera | None = None
         self._seeds, self._queries = np.zeros((2, batch), int)
+
+    @cached_property
+    def _look(self) -> Look:
+        """Made for the first picture that is perturbed."""
+        return Look(self._make_look(), self.name, self.image, REACH)
 
     def begin(self, lane: int, seed: int) -> None:
         """An episode begins."""

@@ -74,10 +74,9 @@ class Look:
         shades = given.mat_rgba[:, :3] + HUE * drawn.colours[:-1]
         model.mat_rgba[:, :3] = np.clip(shades, DIM, 1.0)
         if self._textured >= 0:  # half of the time
-            other = self._textured if drawn.colours[self._textured, 0] > 0 else None
-            model.geom_matid[self._tables] = (
-                given.geom_matid[self._tables] if other is None else other
-            )
+            model.geom_matid[:] = given.geom_matid
+            if drawn.colours[self._textured, 0] > 0:
+                model.geom_matid[self._tables] = self._textured
         if self._sky >= 0:
             self._paint_sky(camera, drawn.colours[-1])
         if self._distractor >= 0:
@@ -85,15 +84,12 @@ class Look:
 
     def _light(self, light: np.ndarray) -> None:
         given, model = self._given, self._model
+        turn, axis = np.zeros(4), np.array([light[0], light[1], 0.0])
+        length = float(np.linalg.norm(axis))
+        mujoco.mju_axisAngle2Quat(turn, axis / max(length, 1e-9), LIGHT_TURN * length)
+        tint = (1 + 0.6 * light[2]) * (1 + 0.25 * light[4:])
         for i in range(model.nlight):
-            turn = np.zeros(4)
-            axis = np.array([light[0], light[1], 0.0])
-            angle = LIGHT_TURN * float(np.linalg.norm(axis))
-            mujoco.mju_axisAngle2Quat(
-                turn, axis / max(np.linalg.norm(axis), 1e-9), angle
-            )
             mujoco.mju_rotVecQuat(model.light_dir[i], given.light_dir[i], turn)
-            tint = (1 + 0.6 * light[2]) * (1 + 0.25 * light[4:])
             model.light_diffuse[i] = np.clip(given.light_diffuse[i] * tint, DIM, 1.0)
         ambience = 1 + 0.6 * light[3]
         for name in ("ambient", "diffuse"):

@@ -1,7 +1,7 @@
 """The tasks by name: `load("mug", batch=32, variant="cluttered")`."""
 
 from collections.abc import Callable
-from typing import Any, NamedTuple, get_args
+from typing import NamedTuple, get_args
 
 from jaxplan.robots import PANDA
 from jaxplan.tasks.mug.poses import STARTS
@@ -59,12 +59,13 @@ def load(
         ValueError: There is no such task, or no such variant of it.
     """
     check(name, variant)
-    settings: dict[str, Any] = {
-        "camera": camera,
-        "friction": friction,
-        "perturbation": perturbation,
-    }
-    return TASKS[name].make(batch, variant=variant, **settings)
+    return TASKS[name].make(
+        batch,
+        variant=variant,
+        camera=camera,
+        friction=friction,
+        perturbation=perturbation,
+    )
 
 
 def check(name: str, variant: str = "plain") -> str:

@@ -5,7 +5,7 @@ which contacts its phases allow, and what counts as success.
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import jax.numpy as jnp
@@ -49,7 +49,8 @@ class Tabletop(ABC):
         camera: Which one takes the pictures.
         image: Its rows and columns [px].
         perturbation: What varies in the pictures.
-        look: What they are taken of, with the model's joints; the model itself where None.
+        look: Makes what perturbed ones are taken of, with the model's joints; the model itself
+            where None.
 
     Raises:
         ValueError: There is no such camera.
@@ -67,7 +68,7 @@ class Tabletop(ABC):
         camera: str,
         image: tuple[int, int],
         perturbation: Perturbation = NOMINAL,
-        look: mujoco.MjModel | None = None,
+        look: Callable[[], mujoco.MjModel] | None = None,
     ) -> None:
         self.name, self.robot, self.model, self.batch = name, robot, model, batch
         self.camera = camera
@@ -75,7 +76,7 @@ class Tabletop(ABC):
         self.closed = np.zeros(batch, bool)
         self.planning_scene = Scene.from_mjcf(planning)
         self._kinematics = InverseKinematics(robot, model)
-        look = model if look is None else look
+        look = look or (lambda: model)
         self.eyes = Eyes(model, look, camera, image, batch, perturbation)
         self._pads = {model.geom(pad).id for pad in robot.pads}
         self._body = model.body(movable).id

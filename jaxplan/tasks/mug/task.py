@@ -1,6 +1,7 @@
 """The mug task: reset, keyframes, what phases allow, and the judge."""
 
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 
@@ -56,7 +57,7 @@ class MugTask(Tabletop):
             camera,
             (scene.IMAGE_HEIGHT, scene.IMAGE_WIDTH),
             perturbation,
-            scene.look(shape, variant),
+            partial(scene.look, shape, variant),
         )
         self.shape = shape
         self.variant: scene.Variant = variant
