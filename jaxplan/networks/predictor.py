@@ -36,6 +36,18 @@ class PredictorConfig(Checked):
     q_min: tuple[Number, ...] = Q_MIN
     q_max: tuple[Number, ...] = Q_MAX
 
+    def __post_init__(self) -> None:
+        """Checks the fields, and that there is a camera to calibrate.
+
+        Raises:
+            ValueError: A field makes no sense.
+        """
+        super().__post_init__()
+        if self.calibrates and self.camera is None:
+            raise ValueError(
+                "calibrates: there is no camera to calibrate (camera is None)"
+            )
+
 
 class Prediction(NamedTuple):
     """What the three heads say; joints in [-1, 1], where the losses are taken."""
@@ -68,20 +80,17 @@ class Predictor(nn.Module):
         for _ in range(2):
             state = nn.relu(nn.Dense(config.state_features)(state))
         inputs, error = [nn.LayerNorm()(features), state], None
-        if config.calibrates:
-            places = keypoints.reshape(*q.shape[:-1], -1)
-            h = jnp.concatenate([*inputs, places], axis=-1)
-            for k in range(2):
-                h = nn.relu(nn.Dense(config.hidden, name=f"camera_hidden{k}")(h))
-            # Begins with the camera as it is mounted.
-            still = nn.initializers.zeros_init()
-            h = nn.Dense(len(ERROR_SCALE), kernel_init=still, name="camera_error")(h)
-            error = ERROR_SCALE * h
+
+        def flat(*columns: jax.Array) -> list[jax.Array]:
+            return [x.reshape(*q.shape[:-1], -1) for x in columns]
+
         if config.camera is not None:
+            if config.calibrates:
+                # The hand's fingers show it in the image, what stands in the room on the table.
+                seen = flat(keypoints, on_plane(config.camera, keypoints, q))
+                error = self._camera_error(jnp.concatenate([*inputs, *seen], axis=-1))
             points = on_plane(config.camera, keypoints, q, error)
-            position, axes = camera_pose(config.camera, q, error)
-            columns = points, position, axes
-            inputs += [x.reshape(*q.shape[:-1], -1) for x in columns]
+            inputs += flat(points, *camera_pose(config.camera, q, error))
         shared = jnp.concatenate(inputs, axis=-1)
         for _ in range(2):
             shared = nn.relu(nn.Dense(config.hidden)(shared))
@@ -100,6 +109,13 @@ class Predictor(nn.Module):
             features=features,
             camera_error=error,
         )
+
+    def _camera_error(self, h: jax.Array) -> jax.Array:
+        """`[..., N]` to `[..., 5]`; begins with the camera as it is mounted."""
+        for k in range(2):
+            h = nn.relu(nn.Dense(self.config.hidden, name=f"camera_hidden{k}")(h))
+        still = nn.initializers.zeros_init()
+        return ERROR_SCALE * nn.Dense(5, kernel_init=still, name="camera_error")(h)
 
 
 def state_vector(
