@@ -22,7 +22,8 @@ from jaxplan.config import PlannerConfig
 from jaxplan.evaluation.expansions import Counts, normalised, solved_share
 from jaxplan.evaluation.methods import BACKBONES, METHODS, OURS, Backbone, planner
 from jaxplan.evaluation.recorded_study import RecordedStudy, StudyArgs
-from jaxplan.evaluation.tables import Estimate, Result, Table
+from jaxplan.evaluation.result import Result
+from jaxplan.evaluation.tables import Estimate, Table
 
 STEPS = (25, 10, 4, 1)
 P_UNIFORM = (0.0, 0.1, 0.2, 0.4, 0.6, 0.8, 1.0)

@@ -26,6 +26,7 @@ from peers import peer_versions
 from jaxplan.cli import run_script
 from jaxplan.evaluation import versions
 from jaxplan.evaluation.motion_bench import data_directory
+from jaxplan.evaluation.result import write_result
 
 Name = Literal["collision", "planning", "proposals", "compile"]
 PARTS = {
@@ -73,10 +74,10 @@ def main(args: Args) -> None:
         result["parts"][name] = record(part, load, seconds)
         print(f"\n{name}, {seconds:.0f} s")
         show(part)
-        _write(args.out, result)
+        write_result(args.out, result)
     print(f"\nwritten to {args.out}")
     if args.update_baseline:
-        _write(args.baseline, merge(result, baseline))
+        write_result(args.baseline, merge(result, baseline))
         print(f"baseline: {args.baseline}")
     if args.gate and baseline:
         finish(result, baseline)
@@ -110,11 +111,6 @@ def finish(result: dict[str, Any], baseline: dict[str, Any]) -> None:
 
 def _read(file: Path) -> dict[str, Any] | None:
     return json.loads(file.read_text(encoding="utf-8")) if file.is_file() else None
-
-
-def _write(file: Path, result: dict[str, Any]) -> None:
-    file.parent.mkdir(parents=True, exist_ok=True)
-    file.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -8,7 +8,6 @@ so finely that no two geoms move by more than 0.1 mm from one sample to the next
 false if that finds a contact deeper than the tolerance, or one nearer than what was proven.
 """
 
-import json
 import time
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, field
@@ -23,13 +22,14 @@ from tqdm import tqdm
 from jaxplan.cli import run_script
 from jaxplan.collision import World, certify, make_world
 from jaxplan.config import PlannerConfig
-from jaxplan.evaluation import versions, wilson
+from jaxplan.evaluation import wilson
 from jaxplan.evaluation.motion_bench import (
     data_directory,
     read_problems,
     read_robot,
     robot_mjcf,
 )
+from jaxplan.evaluation.result import write_result
 from jaxplan.motion import Planner
 from jaxplan.scene import Scene
 
@@ -106,10 +106,8 @@ def main(args: Args) -> None:
         ],
         "outcomes": [asdict(outcome) for outcome in outcomes],
         "settings": {k: v for k, v in asdict(args).items() if isinstance(v, float)},
-        "versions": versions(),
     }
-    args.out.parent.mkdir(parents=True, exist_ok=True)
-    args.out.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
+    write_result(args.out, result)
     for key in ("paths", "proven", "false", "ratio", "milliseconds"):
         print(f"{key}: {result[key]}")
     for outcome in outcomes:

@@ -22,7 +22,8 @@ from jaxplan.data import TOGGLES
 from jaxplan.evaluation.expansions import Counts, normalised, solved_share
 from jaxplan.evaluation.methods import BACKBONES, METHODS, OURS, Backbone, planner
 from jaxplan.evaluation.recorded_study import RecordedStudy, StudyArgs
-from jaxplan.evaluation.tables import Result, Table
+from jaxplan.evaluation.result import Result
+from jaxplan.evaluation.tables import Table
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,6 @@ Every seed counts. The problems that the episodes pose (about 14 each) are plann
 demonstrations; each path and each executed motion is then judged by C MuJoCo.
 """
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -17,8 +16,9 @@ from jaxplan.cli import run_script
 from jaxplan.demonstrations import ExpertAgent
 from jaxplan.demonstrations.expert import CLEAN
 from jaxplan.episodes import run_episodes
-from jaxplan.evaluation import parse_seeds, versions, wilson
+from jaxplan.evaluation import parse_seeds, wilson
 from jaxplan.evaluation.certification import Certification
+from jaxplan.evaluation.result import write_result
 
 
 @dataclass(frozen=True)
@@ -51,10 +51,8 @@ def main(args: Args) -> None:
         "planning": certification.summary(),
         "episodes": [record.as_json() for record in records],
         "variant": args.variant,
-        "versions": versions(),
     }
-    args.out.parent.mkdir(parents=True, exist_ok=True)
-    args.out.write_text(json.dumps(result, indent=1) + "\n")
+    write_result(args.out, result)
     print(f"expert: {successes}/{len(records)} episodes")
     for record in records:
         if not record.success:

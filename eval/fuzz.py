@@ -1,4 +1,4 @@
-"""Random scenes, whole questions: what raises, and what C MuJoCo refuses.
+"""Random scenes, whole problems: what raises, and what C MuJoCo refuses.
 
     XLA_FLAGS=--xla_backend_optimization_level=0 python eval/fuzz.py --scenes 300 --seed 0
 
@@ -17,14 +17,14 @@ import jax
 from tqdm import tqdm
 
 from jaxplan.cli import run_script
-from jaxplan.evaluation import versions
 from jaxplan.evaluation.fuzzing import Judged, interrogate, worlds_of
 from jaxplan.evaluation.random_scenes import random_scene
+from jaxplan.evaluation.result import write_result
 
 
 @dataclass(frozen=True)
 class Args:
-    """Asks whole questions in random scenes, and has C MuJoCo judge the answers."""
+    """Asks whole problems in random scenes, and has C MuJoCo judge the answers."""
 
     out: Path = Path("runs/fuzz.jsonl")
     """A scene a line; beside it, with the suffix .json, the summary."""
@@ -50,10 +50,9 @@ def main(args: Args) -> None:
             file.write(json.dumps(row) + "\n")
         jax.clear_caches()
     summary = summed([row for row in _rows(args.out) if row["seed"] in seeds])
-    summary |= {"worlds": args.worlds + 1, "versions": versions()}
-    text = json.dumps(summary, indent=1) + "\n"
-    args.out.with_suffix(".json").write_text(text, encoding="utf-8")
-    print(text)
+    summary |= {"worlds": args.worlds + 1}
+    write_result(args.out.with_suffix(".json"), summary)
+    print(json.dumps(summary, indent=1))
 
 
 def asked(seed: int, worlds: int) -> dict:

@@ -26,8 +26,8 @@ from tqdm import tqdm
 
 from jaxplan import Pose, Scene, make_world
 from jaxplan.cli import run_script
-from jaxplan.evaluation import versions
 from jaxplan.evaluation.motion_bench import data_directory
+from jaxplan.evaluation.result import write_result
 from jaxplan.ik import BATCH_ROUNDS, inverse_kinematics, inverse_kinematics_batch
 
 PART = "inverse kinematics"
@@ -91,11 +91,9 @@ def main(args: Args) -> None:
         "ratios": {name: ratio.value for name, ratio in part.ratios.items()},
         "quick": args.quick,
         "load": [load, os.getloadavg()],
-        "versions": versions()
-        | ({"mink": version("mink")} if find_spec("mink") else {}),
     }
-    args.out.parent.mkdir(parents=True, exist_ok=True)
-    args.out.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
+    peers = {"mink": version("mink")} if find_spec("mink") else {}
+    write_result(args.out, result, peers)
     print(f"written to {args.out}")
 
 

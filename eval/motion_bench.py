@@ -8,20 +8,19 @@ compiles between problems. OMPL with C MuJoCo gets the same problems beside it. 
 certified every 5 mm, with 1 mm, in scenes that have no slots.
 """
 
-import json
 import os
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
-from parts.queries import OURS, Query, ask, length, planner_for, refused, rows_of
+from parts.queries import OURS, Answered, ask, length, planner_for, refused, rows_of
 from parts.rows import Part, Row, compare, show
 from peers import peer_versions
 
 from jaxplan.cli import run_script
-from jaxplan.evaluation import versions
 from jaxplan.evaluation.motion_bench import data_directory, read_problems, read_robot
+from jaxplan.evaluation.result import write_result
 
 PART = "MotionBenchMaker"
 
@@ -87,13 +86,11 @@ def save(
         "quick": args.quick,
         "give_up": args.give_up,
         "load": [load, os.getloadavg()],
-        "versions": versions() | peer_versions(),
     }
-    args.out.parent.mkdir(parents=True, exist_ok=True)
-    args.out.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
+    write_result(args.out, result, peer_versions())
 
 
-def smoothed(robot: dict, queries: list[Query]) -> float | None:
+def smoothed(robot: dict, queries: list[Answered]) -> float | None:
     """Median length of the motions after shortcuts and smoothing [rad]."""
     planner, worlds = planner_for(robot, [query.problem for query in queries])
     lengths = []

@@ -8,7 +8,6 @@ MuJoCo, at 0.002 rad and 1 mm. A sheet is thinner than what the arm moves betwee
 checked configurations, so that checks of points alone would miss some.
 """
 
-import json
 import time
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
@@ -21,7 +20,7 @@ from jaxplan import Obstacle, Plan, Planner, Scene, make_world
 from jaxplan.cli import run_script
 from jaxplan.collision import clearance_mujoco
 from jaxplan.collision.touching import random_poses
-from jaxplan.evaluation import versions
+from jaxplan.evaluation.result import write_result
 
 ARM = """
 <mujoco>
@@ -66,22 +65,22 @@ class Args:
     """Plans and times motions in each scene, and has C MuJoCo check them."""
 
     out: Path = Path("runs/motions.json")
-    questions: int = 350
+    problems: int = 350
     """A scene."""
     resolution: float = 0.002
     """Of the certificates [rad]."""
     tolerance: float = 0.001
     """Penetration that still passes [m]."""
     quick: bool = False
-    """20 questions a scene."""
+    """20 problems a scene."""
 
 
 @dataclass
 class Row:
-    """What came of a scene's questions."""
+    """What came of a scene's problems."""
 
     scene: str
-    questions: int = 0
+    problems: int = 0
     solved: int = 0
     paths_refused: int = 0
     motions_refused: int = 0
@@ -96,24 +95,22 @@ class Row:
 def main(args: Args) -> None:
     """Measures, prints a table, writes JSON."""
     planner = Planner(Scene.from_mjcf(ARM, slots={"box": SHEETS}))
-    questions = 20 if args.quick else args.questions
-    rows = [survey(planner, name, questions, args) for name in SCENES]
+    problems = 20 if args.quick else args.problems
+    rows = [survey(planner, name, problems, args) for name in SCENES]
     show(rows)
     settings = asdict(args) | {"out": str(args.out)}
     result = {
         "rows": [asdict(row) for row in rows],
         "settings": settings,
-        "versions": versions(),
     }
-    args.out.parent.mkdir(parents=True, exist_ok=True)
-    args.out.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
+    write_result(args.out, result)
     print(f"written to {args.out}")
 
 
-def survey(planner: Planner, name: str, questions: int, args: Args) -> Row:
-    """Asks a scene's questions."""
+def survey(planner: Planner, name: str, problems: int, args: Args) -> Row:
+    """Asks a scene's problems."""
     row, seconds = Row(name), []
-    for plan in tqdm(solved(planner, name, questions, row), name, questions):
+    for plan in tqdm(solved(planner, name, problems, row), name, problems):
         began = time.perf_counter()
         timed = planner.time(plan)
         seconds.append(time.perf_counter() - began)
@@ -127,17 +124,17 @@ def survey(planner: Planner, name: str, questions: int, args: Args) -> Row:
     return row
 
 
-def solved(planner: Planner, name: str, questions: int, row: Row) -> Iterator[Plan]:
-    """The plans of a scene's questions that have a path; counts them."""
+def solved(planner: Planner, name: str, problems: int, row: Row) -> Iterator[Plan]:
+    """The plans of a scene's problems that have a path; counts them."""
     world = make_world(planner.scene, obstacles=SCENES[name])
-    q = random_poses(planner.scene, 8 * questions)
-    q = q[clearance_mujoco(planner.scene, world, q) > APART][: 2 * questions]
+    q = random_poses(planner.scene, 8 * problems)
+    q = q[clearance_mujoco(planner.scene, world, q) > APART][: 2 * problems]
     starts, goals = q[::2], q[1::2]
     for first in range(0, len(starts), BATCH):
         rows = slice(first, first + BATCH)
         seeds = list(range(first, first + len(starts[rows])))
         for plan in planner.plan_batch(starts[rows], goals[rows], seeds, world):
-            row.questions += 1
+            row.problems += 1
             row.solved += plan.solved
             if plan.solved:
                 yield plan
@@ -146,11 +143,11 @@ def solved(planner: Planner, name: str, questions: int, row: Row) -> Iterator[Pl
 def show(rows: list[Row]) -> None:
     """Prints the table."""
     print(
-        "scene     questions solved  refused: paths motions  unsafe  deepest       time"
+        "scene     problems solved  refused: paths motions  unsafe  deepest       time"
     )
     for row in rows:
         print(
-            f"{row.scene:9s} {row.questions:9d} {row.solved:6d} {row.paths_refused:15d} "
+            f"{row.scene:9s} {row.problems:9d} {row.solved:6d} {row.paths_refused:15d} "
             f"{row.motions_refused:7d} {row.not_free:7d} {1000 * row.deepest:5.2f} mm "
             f"{row.milliseconds:7.1f} ms"
         )

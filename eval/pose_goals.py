@@ -6,7 +6,6 @@ The pose is where C MuJoCo has the last link at the problem's own goal, so that 
 reached by a free configuration. Ends are checked by C MuJoCo, paths are certified.
 """
 
-import json
 import time
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -18,8 +17,9 @@ from tqdm import tqdm
 
 from jaxplan import Pose, Scene
 from jaxplan.cli import run_script
-from jaxplan.evaluation import versions, wilson
+from jaxplan.evaluation import wilson
 from jaxplan.evaluation.motion_bench import data_directory, read_problems, read_robot
+from jaxplan.evaluation.result import write_result
 
 
 @dataclass(frozen=True)
@@ -72,9 +72,7 @@ def main(args: Args) -> None:
             f"{name}: {solved} of {len(problems)} solved, {refused} refused, "
             f"{median:.1f} ms (p95 {p95:.1f}), at most {1e3 * max(off):.3f} mm off"
         )
-    args.out.parent.mkdir(parents=True, exist_ok=True)
-    result = {"rows": rows, "quick": args.quick, "versions": versions()}
-    args.out.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
+    write_result(args.out, {"rows": rows, "quick": args.quick})
     print(f"written to {args.out}")
 
 

@@ -30,7 +30,8 @@ from peers import absent, peer_versions
 from jaxplan.cli import run_script
 from jaxplan.data import IMAGE_SHAPE
 from jaxplan.evaluation.recorded_study import results
-from jaxplan.evaluation.tables import Result, Table
+from jaxplan.evaluation.result import Result
+from jaxplan.evaluation.tables import Table
 from jaxplan.networks import Cond, SamplerConfig, predict
 from jaxplan.pretrained import (
     DIRECTORY,

@@ -15,7 +15,6 @@ most straight motions are free. The last problems ask for goals in collision, so
 is something to refuse.
 """
 
-import json
 import time
 from collections import Counter
 from dataclasses import asdict, dataclass, field
@@ -29,7 +28,7 @@ from jaxplan.cli import run_script
 from jaxplan.collision import World, clearance_mujoco, closest_pair, make_world
 from jaxplan.collision.touching import random_poses
 from jaxplan.config import PlannerConfig
-from jaxplan.evaluation import versions
+from jaxplan.evaluation.result import write_result
 from jaxplan.motion import Planner
 from jaxplan.scene import geom_pairs
 
@@ -104,7 +103,6 @@ def main(args: Args) -> None:
         raise ValueError(
             f"no such robot; there are: {', '.join(r.name for r in ROBOTS)}"
         )
-    args.out.parent.mkdir(parents=True, exist_ok=True)
     rows = []
     for robot in tqdm(robots, unit="robot"):
         row = Row(robot.name, robot.package)
@@ -113,8 +111,7 @@ def main(args: Args) -> None:
         except Exception as error:  # a survey goes on, and its table says what failed
             row.problem = f"{type(error).__name__}: {error}".splitlines()[0]
         rows.append(row)
-        result = {"robots": [asdict(row) for row in rows], "versions": versions()}
-        args.out.write_text(json.dumps(result, indent=1) + "\n")
+        write_result(args.out, {"robots": [asdict(row) for row in rows]})
     show(rows)
     for row in rows:
         for line in row.untrue:

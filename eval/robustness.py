@@ -9,7 +9,6 @@ finished (`runs/pieces`). `--picture FILE.png` draws one scene under each settin
 toggles that were predicted (crosses) and the expert's (discs).
 """
 
-import json
 from collections import Counter
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -24,10 +23,10 @@ from jaxplan import tasks
 from jaxplan.cli import run_script
 from jaxplan.evaluation import ClosedLoop, ClosedLoopConfig, parse_seeds
 from jaxplan.evaluation.memo import Memo
+from jaxplan.evaluation.result import write_result
 from jaxplan.evaluation.tables import Estimate, Table, markdown
 from jaxplan.pictures.painter import CLOSES, SUBGOAL, Mark, marked
 from jaxplan.pretrained import load_pair, shipped
-from jaxplan.provenance import versions
 from jaxplan.tasks.perturbation import NOMINAL, Perturbation
 
 MILD = Perturbation(yaw=5, pitch=5, translation=0.01)
@@ -95,10 +94,8 @@ def main(args: Args) -> None:
         "seeds": [seeds.start, seeds.stop],
         "variant": args.variant,
         "weights": [network.info.get("sha256") for network in weights],
-        "versions": versions(),
     }
-    args.out.parent.mkdir(parents=True, exist_ok=True)
-    args.out.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
+    write_result(args.out, result)
     print(f"written to {args.out}")
     if args.picture is not None:
         draw(loop, args.settings, seeds[0]).save(args.picture)

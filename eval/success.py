@@ -3,7 +3,6 @@
 A killed run goes on after the batches that it has finished (`runs/pieces`).
 """
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,6 +12,7 @@ from jaxplan import tasks
 from jaxplan.cli import run_script
 from jaxplan.evaluation import ClosedLoopConfig, evaluate, parse_seeds
 from jaxplan.evaluation.memo import Memo
+from jaxplan.evaluation.result import write_result
 from jaxplan.pretrained import load_pair, shipped
 
 
@@ -35,13 +35,12 @@ def main(args: Args) -> None:
     seeds = parse_seeds(args.seeds)
     tasks.check(args.study.task, args.study.variant)
     weights = load_pair(args.weights or shipped(args.study.variant))
-    args.out.parent.mkdir(parents=True, exist_ok=True)
     with tqdm(total=len(seeds), unit="episode") as bar:
         result = evaluate(seeds, weights, args.study, bar.update, Memo())
     if not args.phases:
         for episode in result["episodes"]:
             del episode["phases"]
-    args.out.write_text(json.dumps(result, indent=1) + "\n")
+    write_result(args.out, result)
     low, high = result["wilson_95"]
     print(
         f"success {result['successes']}/{result['trials']} = {result['success_rate']:.3f} "

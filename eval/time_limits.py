@@ -6,7 +6,6 @@ A wall stands between start and goal of the table, on both sides of the base and
 the arm would have to be in the gap at once. Seed after seed.
 """
 
-import json
 import time
 from collections import Counter
 from dataclasses import dataclass, field
@@ -17,7 +16,6 @@ from tqdm import tqdm
 
 from jaxplan import Obstacle, Planner, PlannerConfig, Scene
 from jaxplan.cli import run_script
-from jaxplan.evaluation import versions
 from jaxplan.evaluation.motion_bench import (
     data_directory,
     obstacles_mjcf,
@@ -25,6 +23,7 @@ from jaxplan.evaluation.motion_bench import (
     robot_mjcf,
     table,
 )
+from jaxplan.evaluation.result import write_result
 
 WALL = (
     Obstacle("box", [1.0, 0.005, 1.5], [1.15, 0.0, 0.5, 1, 0, 0, 0]),
@@ -69,10 +68,8 @@ def main(args: Args) -> None:
         "time_limit": args.time_limit,
         "seconds": dict(zip(("median", "p95", "most"), quantiles, strict=True)),
         "statuses": dict(statuses),
-        "versions": versions(),
     }
-    args.out.parent.mkdir(parents=True, exist_ok=True)
-    args.out.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
+    write_result(args.out, result)
     print(f"{result['seconds']} s at a limit of {args.time_limit} s; {dict(statuses)}")
     print(f"written to {args.out}")
 

@@ -22,8 +22,9 @@ from jaxplan.cli import run_script
 from jaxplan.config import PAPER_PLANNER
 from jaxplan.evaluation.memo import code_digest
 from jaxplan.evaluation.recorded_study import RecordedStudy, StudyArgs
+from jaxplan.evaluation.result import Result
 from jaxplan.evaluation.statistics import ratio_of_means
-from jaxplan.evaluation.tables import Estimate, Result, Table
+from jaxplan.evaluation.tables import Estimate, Table
 from jaxplan.provenance import versions
 from jaxplan.samplers.bank import SIZE
 

@@ -1,4 +1,4 @@
-"""Refuses to work in a forked child: JAX's threads stay behind, and a question would hang."""
+"""Refuses to work in a forked child: JAX's threads stay behind, and a call would hang."""
 
 import os
 

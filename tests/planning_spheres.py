@@ -63,18 +63,20 @@ def noisy_sampler(q_start, q_goal, keys, rows=8, based=False):
 
     With `based` they say that they begin beside the straight motion.
     """
-    return lambda chunk: _noisy_segments(q_start, q_goal, keys, chunk, rows, based)
+    return lambda bank_number: _noisy_segments(
+        q_start, q_goal, keys, bank_number, rows, based
+    )
 
 
 @partial(jax.jit, static_argnums=(4, 5))
-def _noisy_segments(q_start, q_goal, keys, chunk, rows, based):
+def _noisy_segments(q_start, q_goal, keys, bank_number, rows, based):
     d = q_start.shape[1]
 
     def one(key, j):
         key = jax.random.fold_in(jax.random.fold_in(key, 7), j)
         return jax.random.uniform(key, (d + 1,), minval=-1, maxval=1)
 
-    index = chunk[:, None] * rows + jnp.arange(rows)
+    index = bank_number[:, None] * rows + jnp.arange(rows)
     noise = jax.vmap(jax.vmap(one, (None, 0)))(keys, index)
     gap = q_goal - q_start
     straight = gap / jnp.linalg.norm(gap, axis=-1, keepdims=True)

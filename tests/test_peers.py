@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from jaxplan.evaluation.motion_bench import (
-    Problem,
+    BenchProblem,
     data_directory,
     read_problems,
     read_robot,
@@ -25,7 +25,7 @@ def robot() -> dict:
 
 
 @pytest.fixture(scope="module")
-def problems() -> list[Problem]:
+def problems() -> list[BenchProblem]:
     sets = read_problems(data_directory()).values()
     return [sphere_cage(), table(), *(rows[0] for rows in sets)]
 

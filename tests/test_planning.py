@@ -38,7 +38,7 @@ from jaxplan.planning.edges import (
     points_for,
 )
 from jaxplan.planning.space import Space
-from jaxplan.planning.state import Query
+from jaxplan.planning.state import Problem
 
 METHODS = ("rrt", "rrt_connect")
 LITERAL = replace(
@@ -67,19 +67,23 @@ def _grown(config, d):
     go, rounds = jnp.array(False), jnp.int32(2**30)
 
     @jax.jit
-    def grow(worlds, state, query, status, bank):
+    def grow(worlds, state, problems, status, bank):
         def free(problem, q):
             return config_free(worlds, problem, q)
 
         return lanes.run(
-            state, query, status, bank, free, None, rounds, go, space, config
+            state, problems, status, bank, free, None, rounds, go, space, config
         )
 
-    def begin(query):
-        query, status = ends.examine(query, space)
-        empty = lanes.empty(query, len(status), space, config)
+    def begin(problems):
+        problems, status = ends.examine(problems, space)
+        empty = lanes.empty(problems, len(status), space, config)
         new = jnp.array(True)
-        return lanes.begin(empty, new, query, status, space, config), query, status
+        return (
+            lanes.begin(empty, new, problems, status, space, config),
+            problems,
+            status,
+        )
 
     return jax.jit(begin), grow
 
@@ -89,11 +93,11 @@ def searched_trees(config, worlds, q_start, q_goal, q_toggle, keys, draw):
     begin, grow = _grown(config, q_start.shape[1])
     ends = (jnp.asarray(q) for q in (q_start, q_goal, q_toggle))
     goals = jnp.zeros((len(keys), 0, q_start.shape[1]))
-    query = Query(*ends, keys, jnp.full(len(keys), jnp.inf), goals)
-    state, query, status = begin(query)
+    problems = Problem(*ends, keys, jnp.full(len(keys), jnp.inf), goals)
+    state, problems, status = begin(problems)
     waiting = np.ones(len(q_start), bool)
     while waiting.any():
-        state = grow(worlds, state, query, status, draw(state.state.chunk))
+        state = grow(worlds, state, problems, status, draw(state.state.bank_number))
         waiting = np.asarray(state.state.waiting)
     tree = state.state.tree._replace(q=jnp.swapaxes(state.state.tree.q, 1, 2))
     return jax.tree.map(np.asarray, (state.answers, tree))
@@ -302,10 +306,10 @@ def test_batched_search_is_the_sequential_one(name):
     q_toggle = q_goal + 0.3
     draw = noisy_sampler(q_start, q_goal, keys, based="with bases" in name)
     result, tree = searched_trees(config, worlds, q_start, q_goal, q_toggle, keys, draw)
-    chunks = [draw(jnp.full(count, c)) for c in range(100 // 8 + 1)]
+    banks = [draw(jnp.full(count, c)) for c in range(100 // 8 + 1)]
     for p in range(count):
         segments = jax.tree.map(
-            lambda *c, p=p: jnp.concatenate([x[p] for x in c]), *chunks
+            lambda *c, p=p: jnp.concatenate([x[p] for x in c]), *banks
         )
         world = Spheres(worlds.centre[p], worlds.radius[p])
         oracle = Oracle(
@@ -422,7 +426,7 @@ def test_p_uniform_1_is_plain_rrt():
     """With p_uniform = 1 the sampler is never asked, and the tree is that of no sampler."""
     worlds, q_start, q_goal, keys = problems(16, seed=4)
 
-    def never(chunk):
+    def never(bank_number):
         raise AssertionError("asked")
 
     plan = planner(settings_of(max_expansions=60, p_uniform=1.0))
@@ -459,7 +463,7 @@ def test_no_sampler_can_spoil_completeness(sampler):
     direction = np.broadcast_to(direction[:, None], (100, 32, 7))
     bank = Segment(jnp.asarray(direction), jnp.full((100, 32), length))
     plan = planner(settings_of(max_expansions=2000, workers=8))
-    result = plan(worlds, q_start, q_goal, q_goal, keys, lambda chunk: bank)
+    result = plan(worlds, q_start, q_goal, q_goal, keys, lambda bank_number: bank)
     assert np.all(result.status == Status.SOLVED), np.bincount(result.status)
     assert np.all(np.isfinite(result.path))
 
@@ -469,7 +473,7 @@ def test_a_broken_sampler_leaves_plain_rrt():
     worlds, q_start, q_goal, keys = problems(16, seed=6)
     bank = Segment(jnp.full((16, 8, 7), jnp.nan), jnp.ones((16, 8)))
     plan = small()
-    broken = plan(worlds, q_start, q_goal, q_goal, keys, lambda chunk: bank)
+    broken = plan(worlds, q_start, q_goal, q_goal, keys, lambda bank_number: bank)
     plain = plan(worlds, q_start, q_goal, q_goal, keys)
     np.testing.assert_array_equal(broken.path, plain.path)
     np.testing.assert_array_equal(broken.expansions, plain.expansions)
@@ -585,17 +589,17 @@ def test_the_sampler_is_asked_when_a_search_asks():
     plan = make_planner(config_free, config, -limit, limit)
     draw, asked = noisy_sampler(q_start, q_goal, keys), []
 
-    def listened(chunk):
-        asked.append(np.asarray(chunk))
-        return draw(chunk)
+    def listened(bank_number):
+        asked.append(np.asarray(bank_number))
+        return draw(bank_number)
 
     first = plan(worlds, q_start, q_goal, q_goal, keys, listened)
     asked.clear()
     again = plan(worlds, q_start, q_goal, q_goal, keys, listened)
     assert_same_answers(first, again)
-    assert any(np.any(chunk >= 0) for chunk in asked)
-    for chunk in asked:
-        assert np.all(np.asarray(first.learned)[chunk >= 0] > 0)
+    assert any(np.any(bank_number >= 0) for bank_number in asked)
+    for bank_number in asked:
+        assert np.all(np.asarray(first.learned)[bank_number >= 0] > 0)
     asked.clear()
     plan(worlds, q_start, q_start, q_start, keys, listened)
     assert asked == []

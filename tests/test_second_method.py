@@ -11,9 +11,9 @@ from jaxplan.planning.methods import METHODS
 from jaxplan.planning.rrt import RRT
 
 
-def begin(query, space, config):
+def begin(problems, space, config):
     """Nobody tries the straight motion first."""
-    control = RRT.begin(query, space, config)
+    control = RRT.begin(problems, space, config)
     nobody = jnp.zeros_like(control.connecting)
     return control._replace(connecting=nobody, chained=nobody)
 

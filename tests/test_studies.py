@@ -20,7 +20,7 @@ from jaxplan.evaluation import problems as store
 from jaxplan.evaluation.expansions import Counts, normalised, solved_share
 from jaxplan.evaluation.memo import Memo
 from jaxplan.evaluation.methods import BACKBONES, METHODS, planner
-from jaxplan.evaluation.problems import Problems
+from jaxplan.evaluation.problems import RecordedProblems
 from jaxplan.evaluation.statistics import bootstrap
 from jaxplan.evaluation.tables import Estimate, Table, cell, markdown
 from jaxplan.learned import LearnedProposals, Upper
@@ -36,7 +36,7 @@ def counts(expansions, solved=EVERY, trial=(0, 0, 1, 1)) -> Counts:
     return Counts(np.array(expansions), np.array(solved), np.array(trial))
 
 
-def some_problems(seeds=(7, 7, 9)) -> Problems:
+def some_problems(seeds=(7, 7, 9)) -> RecordedProblems:
     """Arrays of the right kinds; their numbers mean nothing."""
     rng, count = np.random.default_rng(0), len(seeds)
     flags = {"success", "last", "blocked", "held", "ignored"}
@@ -50,14 +50,14 @@ def some_problems(seeds=(7, 7, 9)) -> Problems:
         "ignored": (5,),
     }
     columns = {}
-    for name in Problems._fields:
+    for name in RecordedProblems._fields:
         joints = name.startswith("q") or name == "target"
         shape = (count, *shapes.get(name, (7,) if joints else ()))
         columns[name] = rng.random(shape, np.float32)
         if name in flags:
             columns[name] = columns[name] > 0.5
     numbers = {"seed": np.array(seeds, np.int32), "phase": np.arange(count)}
-    return Problems(**(columns | numbers))
+    return RecordedProblems(**(columns | numbers))
 
 
 def test_a_method_against_itself_is_one():

@@ -46,7 +46,7 @@ def test_no_number_is_no_base(method):
     bank = along_the_corner(8, 32)
     bank = bank._replace(base=bank.base.at[..., 0].set(jnp.nan))
     plan = planner(method=method)
-    broken = plan(*corner(8), lambda chunk: bank)
+    broken = plan(*corner(8), lambda bank_number: bank)
     uniform = plan(*corner(8))
     np.testing.assert_array_equal(broken.path, uniform.path)
     np.testing.assert_array_equal(broken.expansions, uniform.expansions)
@@ -57,7 +57,7 @@ def test_switched_off_bases_do_not_count(method):
     bank = along_the_corner(8, 32)
     plan = planner(method=method, tree_context=False)
     told, blind = (
-        plan(*corner(8), lambda chunk, bank=bank: bank)
+        plan(*corner(8), lambda bank_number, bank=bank: bank)
         for bank in (bank, bank._replace(base=None))
     )
     np.testing.assert_array_equal(told.path, blind.path)
@@ -75,7 +75,7 @@ def test_a_bent_way_takes_fewer_expansions_with_bases(method):
     """Around a corner, segments of the first half do not help in the second."""
     bank = along_the_corner(32, 32)
     told, blind = (
-        planner(method=method, tree_context=on)(*corner(32), lambda chunk: bank)
+        planner(method=method, tree_context=on)(*corner(32), lambda bank_number: bank)
         for on in (True, False)
     )
     # A node that strayed behind the sphere is nearest to the goal, and no way on.

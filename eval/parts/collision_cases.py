@@ -11,7 +11,7 @@ from peers import peer_model, slots_for
 from jaxplan.collision import Obstacle, World, make_world
 from jaxplan.collision.positions import carry, qpos_rows
 from jaxplan.evaluation.motion_bench import (
-    Problem,
+    BenchProblem,
     obstacles_mjcf,
     read_problems,
     read_robot,
@@ -71,7 +71,7 @@ def mug_cases(rows: int) -> Iterator[Case]:
 
 
 def _panda_case(
-    name: str, robot: dict, problem: Problem, scene: Scene, world: World, rows: int
+    name: str, robot: dict, problem: BenchProblem, scene: Scene, world: World, rows: int
 ) -> Case:
     model = peer_model(robot, problem.obstacles)
     _cheapest(model)

@@ -45,9 +45,9 @@ class Sampler:
     def of(self, cond: Cond, key: jax.Array) -> DrawBank:
         """The planner's `draw` for one problem."""
 
-        def draw(chunk: jax.Array) -> Segment:
+        def draw(bank_number: jax.Array) -> Segment:
             start = time.perf_counter()
-            drawn = jax.block_until_ready(self._bank.of(cond, key)(chunk))
+            drawn = jax.block_until_ready(self._bank.of(cond, key)(bank_number))
             self.seconds += time.perf_counter() - start
             return drawn
 
@@ -57,9 +57,9 @@ class Sampler:
         """Seconds of one proposal drawn alone, median."""
         times = []
         for number in range(PROPOSALS + 1):
-            chunk = jnp.full(1, number, jnp.int32)
+            bank_number = jnp.full(1, number, jnp.int32)
             start = time.perf_counter()
-            jax.block_until_ready(self._one.of(cond, key)(chunk))
+            jax.block_until_ready(self._one.of(cond, key)(bank_number))
             times.append(time.perf_counter() - start)
         return float(np.median(times[1:]))
 

@@ -13,7 +13,7 @@ from peers import absent
 from tqdm import tqdm
 
 from jaxplan.evaluation.motion_bench import (
-    Problem,
+    BenchProblem,
     read_problems,
     read_robot,
     sphere_cage,
@@ -69,7 +69,7 @@ def measure(quick: bool, data: Path) -> Part:
 
 
 def batch_rows(
-    robot: dict, name: str, problems: Sequence[Problem], rounds: int
+    robot: dict, name: str, problems: Sequence[BenchProblem], rounds: int
 ) -> tuple[list[Row], int]:
     """Problems a second of each side, and how many ours did not solve.
 
@@ -111,7 +111,7 @@ def ompl_sides() -> dict[str, int]:
 
 
 def ompl_row(
-    robot: dict, name: str, side: str, problems: Sequence[Problem], processes: int
+    robot: dict, name: str, side: str, problems: Sequence[BenchProblem], processes: int
 ) -> Row:
     if reason := absent("ompl"):
         return Row(PART, name, side, note=reason)

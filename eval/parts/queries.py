@@ -16,7 +16,7 @@ from tqdm import tqdm
 
 from jaxplan.collision import World, certify, make_world
 from jaxplan.config import PlannerConfig
-from jaxplan.evaluation.motion_bench import Problem, obstacles_mjcf, robot_mjcf
+from jaxplan.evaluation.motion_bench import BenchProblem, obstacles_mjcf, robot_mjcf
 from jaxplan.motion import Planner
 from jaxplan.scene import Scene
 from parts.rows import Row, row_of
@@ -27,16 +27,16 @@ RANGES = {OMPL: None, f"{OMPL}, range 1": 1.0}
 """Longest edge [rad] of each of OMPL's sides; None = its default."""
 
 
-class Query(NamedTuple):
-    """A question and its answer."""
+class Answered(NamedTuple):
+    """A problem and its answer."""
 
-    problem: Problem
+    problem: BenchProblem
     seed: int
     answer: Planned
 
 
 def planner_for(
-    robot: dict, problems: Sequence[Problem]
+    robot: dict, problems: Sequence[BenchProblem]
 ) -> tuple[Planner, list[World]]:
     """Our planner, compiled once for all of the problems, and the world of each.
 
@@ -54,10 +54,10 @@ def planner_for(
 def ask(
     robot: dict,
     name: str,
-    problems: Sequence[Problem],
+    problems: Sequence[BenchProblem],
     seeds: Sequence[int],
     give_up: float = 10.0,
-) -> dict[str, list[Query]]:
+) -> dict[str, list[Answered]]:
     """Answers of each side that is here to all problems; OMPL gives up after so many seconds."""
     planner, worlds = planner_for(robot, problems)
 
@@ -72,14 +72,14 @@ def ask(
     sides: dict[str, Callable[[int], Planned]] = {OURS: ours}
     if not absent("ompl"):
         sides |= _ompl_sides(robot, problems, seeds, give_up)
-    found: dict[str, list[Query]] = {side: [] for side in sides}
+    found: dict[str, list[Answered]] = {side: [] for side in sides}
     for i in tqdm(range(len(problems)), desc=name, unit="problem"):
         for side, solve in sides.items():
-            found[side].append(Query(problems[i], seeds[i], solve(i)))
+            found[side].append(Answered(problems[i], seeds[i], solve(i)))
     return found
 
 
-def rows_of(part: str, scene: str, found: dict[str, list[Query]]) -> list[Row]:
+def rows_of(part: str, scene: str, found: dict[str, list[Answered]]) -> list[Row]:
     """A row for each side, those that are not here included."""
     return [
         _row(part, scene, side, queries) for side, queries in found.items()
@@ -92,7 +92,7 @@ def absent_rows(part: str, scene: str) -> list[Row]:
     return [Row(part, scene, side, note=reason) for side in RANGES] if reason else []
 
 
-def refused(robot: dict, queries: Sequence[Query]) -> list[str]:
+def refused(robot: dict, queries: Sequence[Answered]) -> list[str]:
     """What `certify` says against paths: every 5 mm, no contact deeper than 1 mm.
 
     It checks scenes made from the obstacles themselves, without slots.
@@ -117,12 +117,12 @@ def length(path: np.ndarray) -> float:
     return float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum())
 
 
-def _scene(robot: dict, problem: Problem) -> Scene:
+def _scene(robot: dict, problem: BenchProblem) -> Scene:
     return Scene.from_mjcf(robot_mjcf(robot, obstacles_mjcf(problem.obstacles)))
 
 
 def _ompl_sides(
-    robot: dict, problems: Sequence[Problem], seeds: Sequence[int], give_up: float
+    robot: dict, problems: Sequence[BenchProblem], seeds: Sequence[int], give_up: float
 ) -> dict[str, Callable[[int], Planned]]:
     from peers.ompl_peer import OmplPlanner
 
@@ -144,7 +144,7 @@ def _ompl_sides(
     return {name: side(range) for name, range in RANGES.items()}
 
 
-def _row(part: str, scene: str, side: str, queries: list[Query]) -> Row:
+def _row(part: str, scene: str, side: str, queries: list[Answered]) -> Row:
     milliseconds = [1000 * query.answer.seconds for query in queries]
     solved = [query.answer for query in queries if query.answer.solved]
     return row_of(

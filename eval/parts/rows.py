@@ -24,7 +24,7 @@ class Row:
     p10: float | None = None
     p90: float | None = None
     size: int = 1
-    """Questions in a call."""
+    """Problems in a call."""
     note: str = ""
     more: dict[str, Any] = field(default_factory=dict)
 

@@ -24,7 +24,7 @@ class Side(NamedTuple):
 
     name: str
     call: Callable[[], Any]
-    """Answers `size` questions; returns when done."""
+    """Answers `size` problems; returns when done."""
     size: int
     compile_seconds: float | None = None
 

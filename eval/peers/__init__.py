@@ -13,7 +13,7 @@ import mujoco
 import numpy as np
 
 from jaxplan.collision import Obstacle
-from jaxplan.evaluation.motion_bench import Problem, obstacles_mjcf, robot_mjcf
+from jaxplan.evaluation.motion_bench import BenchProblem, obstacles_mjcf, robot_mjcf
 
 PACKAGES = "ompl", "pybullet", "torch"
 
@@ -52,7 +52,7 @@ def peer_model(robot: dict, obstacles: Iterable[Obstacle]) -> mujoco.MjModel:
     return model
 
 
-def slots_for(problems: Iterable[Problem]) -> dict[str, int]:
+def slots_for(problems: Iterable[BenchProblem]) -> dict[str, int]:
     """Room for the obstacles of any of the problems, as `Scene.from_mjcf` takes it."""
     slots: Counter[str] = Counter()
     for problem in problems:

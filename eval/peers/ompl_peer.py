@@ -13,7 +13,7 @@ import mujoco
 import numpy as np
 from ompl import base, geometric, util  # pyright: ignore[reportMissingImports]
 
-from jaxplan.evaluation.motion_bench import Problem
+from jaxplan.evaluation.motion_bench import BenchProblem
 from peers import Planned, peer_model
 
 RESOLUTION = 1 / 32
@@ -92,7 +92,7 @@ class OmplPlanner:
 
 def solve_in_processes(
     robot: dict,
-    problems: Sequence[Problem],
+    problems: Sequence[BenchProblem],
     seeds: Sequence[int],
     processes: int,
     range: float | None = None,
@@ -113,12 +113,12 @@ def solve_in_processes(
         return answers, time.perf_counter() - start
 
 
-_prepared: list[tuple[OmplPlanner, Problem]] = []
+_prepared: list[tuple[OmplPlanner, BenchProblem]] = []
 """A process's scenes."""
 
 
 def _prepare(
-    robot: dict, problems: Sequence[Problem], range: float | None, ready: Barrier
+    robot: dict, problems: Sequence[BenchProblem], range: float | None, ready: Barrier
 ) -> None:
     for problem in problems:
         model = peer_model(robot, problem.obstacles)

@@ -24,7 +24,6 @@ from jaxplan.evaluation.toggle_error import ToggleError, ToggleErrors, summarize
 from jaxplan.learned import learned
 from jaxplan.learning import Weights
 from jaxplan.motion import MotionPlanner
-from jaxplan.provenance import versions
 from jaxplan.simulation.physics import CONTROL_PERIOD
 from jaxplan.tasks.perturbation import NOMINAL, Perturbation
 
@@ -114,7 +113,7 @@ class ClosedLoop:
                 together with `predict` and `listen`, of which it knows nothing.
 
         Returns:
-            JSON-ready: success_rate, wilson_95, episodes, toggle_error, config, versions.
+            JSON-ready: success_rate, wilson_95, episodes, toggle_error, config.
         """
         assert memo is None or (predict is None and listen is None)
         measured, watch = ToggleErrors(self.task), self.task.watch()
@@ -211,7 +210,6 @@ class ClosedLoop:
                 )
             },
             "config": dataclasses.asdict(self.config),
-            "versions": versions(),
         }
 
 

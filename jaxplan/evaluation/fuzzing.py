@@ -1,4 +1,4 @@
-"""Whole questions about one scene, each answer judged by C MuJoCo.
+"""Whole problems about one scene, each answer judged by C MuJoCo.
 
 What is not as it should be is kept as a fault, a line of text; so is any exception.
 """
@@ -38,7 +38,7 @@ REACH = 0.05
 STEP = 0.002
 """Motion of any two geoms between samples of a path [m]."""
 LIMIT = 20.0
-"""On the time of a question [s]."""
+"""On the time of a problem [s]."""
 
 
 @dataclass
@@ -55,22 +55,22 @@ def interrogate(scene: Scene, seed: int, worlds: list[World]) -> Judged:
 
     Args:
         scene: The scene.
-        seed: Of the questions and of the planner's settings.
+        seed: Of the problems and of the planner's settings.
         worlds: Where they are asked.
     """
     judged = Judged()
     try:
         rng = np.random.default_rng(seed)
-        questioner = _Questioner(scene, rng, judged)
+        examiner = _Examiner(scene, rng, judged)
         for number, world in enumerate(worlds):
-            for fault in questioner.faults(world, first=not number):
+            for fault in examiner.faults(world, first=not number):
                 judged.faults.append(f"world {number}: {fault}")
     except Exception:
         judged.faults.append(traceback.format_exc())
     return judged
 
 
-class _Questioner:
+class _Examiner:
     """A planner of random settings, and what it is asked."""
 
     def __init__(self, scene: Scene, rng: np.random.Generator, judged: Judged) -> None:
@@ -97,7 +97,7 @@ class _Questioner:
         batch = planner.plan_batch(ends[::2], ends[1::2], None, world, time_limit=LIMIT)
         for row, plan in enumerate(batch):
             pair = ends[2 * row], ends[2 * row + 1]
-            yield from self._path(plan, *pair, f"question {row}")
+            yield from self._path(plan, *pair, f"problem {row}")
         if first and self.asks["alone"]:
             yield from self._alone(batch[0], ends, q, ours)
         if first and self.asks["poses"]:
@@ -106,7 +106,7 @@ class _Questioner:
     def _alone(
         self, other: Plan, ends: np.ndarray, q: np.ndarray, ours: np.ndarray
     ) -> Iterator[str]:
-        """The first question of a batch on its own, of a copied planner; its distances."""
+        """The first problem of a batch on its own, of a copied planner; its distances."""
         planner = pickle.loads(pickle.dumps(self.planner))
         self.judged.counts["asked alone"] += 1
         plan = planner.plan(ends[0], ends[1], 0, other.world, time_limit=LIMIT)

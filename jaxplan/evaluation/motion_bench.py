@@ -23,7 +23,7 @@ HOME = (0, -0.785, 0, -2.356, 0, 1.571, 0.785)
 """Where the Panda rests [rad]: the start of all of its problems in MotionBenchMaker."""
 
 
-class Problem(NamedTuple):
+class BenchProblem(NamedTuple):
     """From a start to a goal among obstacles."""
 
     set: str
@@ -53,7 +53,7 @@ def read_robot(directory: str | os.PathLike, name: str = "panda") -> dict:
 
 def read_problems(
     directory: str | os.PathLike, name: str = "panda"
-) -> dict[str, list[Problem]]:
+) -> dict[str, list[BenchProblem]]:
     """The problems of each set, in its order, with the first of their goals.
 
     Raises:
@@ -124,7 +124,7 @@ def obstacles_mjcf(obstacles: Iterable[Obstacle]) -> str:
     )
 
 
-def sphere_cage() -> Problem:
+def sphere_cage() -> BenchProblem:
     """VAMP's example: out of one gap between 14 spheres and into another."""
     low = [(0.55, 0), (0.35, 0.35), (0, 0.55), (-0.55, 0), (-0.35, -0.35)]
     low += [(0, -0.55), (0.35, -0.35)]
@@ -136,7 +136,7 @@ def sphere_cage() -> Problem:
     return _problem("sphere_cage", 0, HOME, goal, spheres)
 
 
-def table() -> Problem:
+def table() -> BenchProblem:
     """From over a cup into the box, with a block in between."""
     obstacles = [
         _obstacle("box", [0.3, 0.5, 0.02], [0.6, 0, 0.1]),  # table top
@@ -191,9 +191,9 @@ def _problem(
     start: Iterable[float],
     goal: Iterable[float],
     obstacles: Iterable[Obstacle],
-) -> Problem:
+) -> BenchProblem:
     q_start, q_goal = np.array([start, goal], float)
-    return Problem(name, index, q_start, q_goal, tuple(obstacles))
+    return BenchProblem(name, index, q_start, q_goal, tuple(obstacles))
 
 
 def _joint(joint: dict) -> str:

@@ -25,7 +25,7 @@ from jaxplan.data import (
 )
 
 
-class Problems(NamedTuple):
+class RecordedProblems(NamedTuple):
     """P phases, in the order of episodes and phases."""
 
     seed: np.ndarray
@@ -74,9 +74,9 @@ class Problems(NamedTuple):
         """i64 [P] which episode (trial) each problem belongs to, counted from 0."""
         return np.unique(self.seed, return_inverse=True)[1]
 
-    def take(self, rows: np.ndarray) -> "Problems":
+    def take(self, rows: np.ndarray) -> "RecordedProblems":
         """Some of the problems."""
-        return Problems(*(column[rows] for column in self))
+        return RecordedProblems(*(column[rows] for column in self))
 
     def keys(self) -> jax.Array:
         """[P] typed keys, as the outer loop gives them to search and sampler."""
@@ -105,7 +105,7 @@ def begin(directory: str | os.PathLike, settings: dict) -> dict[str, str]:
     }
 
 
-def add(directory: str | os.PathLike, name: str, problems: Problems) -> None:
+def add(directory: str | os.PathLike, name: str, problems: RecordedProblems) -> None:
     """Writes a shard, and its checksum into the manifest."""
     path = Path(directory) / name
     write_npz(path, problems._asdict())
@@ -114,7 +114,7 @@ def add(directory: str | os.PathLike, name: str, problems: Problems) -> None:
     save_manifest(directory, manifest["settings"], shards)
 
 
-def read(directory: str | os.PathLike, names: list[str]) -> Problems:
+def read(directory: str | os.PathLike, names: list[str]) -> RecordedProblems:
     """The problems of some shards, checksums verified.
 
     Raises:
@@ -124,5 +124,7 @@ def read(directory: str | os.PathLike, names: list[str]) -> Problems:
     parts = []
     for name in names:
         with np.load(Path(directory) / name, allow_pickle=False) as archive:
-            parts.append([archive[field] for field in Problems._fields])
-    return Problems(*(np.concatenate(column) for column in zip(*parts, strict=True)))
+            parts.append([archive[field] for field in RecordedProblems._fields])
+    return RecordedProblems(
+        *(np.concatenate(column) for column in zip(*parts, strict=True))
+    )

@@ -11,7 +11,7 @@ from tqdm import tqdm
 from jaxplan import tasks
 from jaxplan.config import PlannerConfig
 from jaxplan.evaluation.memo import PLANNING, SAMPLING, Memo, code_digest
-from jaxplan.evaluation.problems import Problems
+from jaxplan.evaluation.problems import RecordedProblems
 from jaxplan.evaluation.recording import SHARD, record
 from jaxplan.evaluation.searches import Answers, KeptBanks, Searcher, conditions
 from jaxplan.evaluation.seeds import parse_seeds
@@ -80,7 +80,9 @@ class RecordedStudy:
                 self.task, args.variant, args.range, upper, progress=bar.update
             )
         self.trials = len(args.range)
-        self.problems: Problems = recorded.take(np.flatnonzero(recorded.success))
+        self.problems: RecordedProblems = recorded.take(
+            np.flatnonzero(recorded.success)
+        )
         self.scene = self.task.planning_scene
         self._weights: dict[str, Weights | None] = {}
         self._cond: Cond | None = None

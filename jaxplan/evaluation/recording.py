@@ -22,7 +22,7 @@ from jaxplan.demonstrations import ExpertAgent
 from jaxplan.demonstrations.expert import CLEAN
 from jaxplan.episodes import run_episodes
 from jaxplan.evaluation import problems as store
-from jaxplan.evaluation.problems import Problems
+from jaxplan.evaluation.problems import RecordedProblems
 from jaxplan.learned import Upper
 from jaxplan.learning import Weights
 from jaxplan.motion import MotionPlanner, jit
@@ -40,7 +40,7 @@ def record(
     predictor: Weights | None,
     directory: Path = Path("runs/problems"),
     progress: Callable[[int], object] = lambda done: None,
-) -> tuple[Problems, str]:
+) -> tuple[RecordedProblems, str]:
     """The problems of one episode a seed; those that are not there yet are made.
 
     Args:
@@ -110,7 +110,7 @@ class ProblemRecorder:
         )
         self._rows: list[tuple] = []
 
-    def run(self, seeds: Sequence[int]) -> Problems:
+    def run(self, seeds: Sequence[int]) -> RecordedProblems:
         """Problems of at most `SHARD` episodes."""
         self._seeds, self._rows = seeds, []
         self._toggles = np.zeros(len(seeds), int)
@@ -120,7 +120,7 @@ class ProblemRecorder:
         order = np.lexsort((columns[1], columns[0]))
         seed, phase, *others = (column[order] for column in columns)
         well = [record.seed for record in records if record.success]
-        return Problems(seed, phase, np.isin(seed, well), *others)
+        return RecordedProblems(seed, phase, np.isin(seed, well), *others)
 
     def _listen(self, phase: Phase) -> None:
         """Keeps a round's problems, but those of hands that back off for good."""

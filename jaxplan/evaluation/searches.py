@@ -12,7 +12,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxplan.config import PlannerConfig
-from jaxplan.evaluation.problems import Problems
+from jaxplan.evaluation.problems import RecordedProblems
 from jaxplan.learning import Weights
 from jaxplan.learning.predictor import image_features
 from jaxplan.motion.search import sampled_search
@@ -43,7 +43,7 @@ class Answers(NamedTuple):
         return self.status == Status.SOLVED
 
 
-def conditions(problems: Problems, predictor: Weights) -> Cond:
+def conditions(problems: RecordedProblems, predictor: Weights) -> Cond:
     """What the samplers are told of each problem; features are the predictor's, frozen."""
     features = image_features(predictor.config, predictor.params, problems.image)
     columns: dict[str, Any] = {
@@ -70,16 +70,16 @@ class KeptBanks:
 
     def __init__(self, bank: Bank, cond: Cond, keys: jax.Array) -> None:
         self._bank, self._cond, self._keys = bank, cond, keys
-        self._chunks: dict[int, tuple[np.ndarray, Any]] = {}
+        self._banks: dict[int, tuple[np.ndarray, Any]] = {}
 
     def of(self, rows: np.ndarray) -> DrawBank:
         """The planner's `draw` for some of the problems."""
 
-        def draw(chunk: jax.Array) -> Segment:
-            chunks = np.maximum(np.asarray(chunk), 0)
+        def draw(bank_number: jax.Array) -> Segment:
+            numbers = np.maximum(np.asarray(bank_number), 0)
             bank = self._empty(len(rows))
-            for number in np.unique(chunks):
-                where = np.flatnonzero(chunks == number)
+            for number in np.unique(numbers):
+                where = np.flatnonzero(numbers == number)
                 _put(bank, where, self._get(int(number), rows[where]))
             return jax.tree.map(jnp.asarray, bank)
 
@@ -91,12 +91,12 @@ class KeptBanks:
         zeros: list[Any] = [np.zeros(n, np.float32) for n in (shape, shape[:2], shape)]
         return Segment(*zeros[: 3 if self._bank.config.tree_context else 2])
 
-    def _get(self, chunk: int, rows: np.ndarray) -> Any:
-        """The segments of a chunk; those that nobody asked for yet are drawn."""
-        if chunk not in self._chunks:
+    def _get(self, number: int, rows: np.ndarray) -> Any:
+        """The segments of a bank; those that nobody asked for yet are drawn."""
+        if number not in self._banks:
             count = len(self._cond.q)
-            self._chunks[chunk] = np.zeros(count, bool), self._empty(count)
-        there, bank = self._chunks[chunk]
+            self._banks[number] = np.zeros(count, bool), self._empty(count)
+        there, bank = self._banks[number]
         missing = np.unique(rows[~there[rows]])
         for first in range(0, len(missing), BLOCK):
             part = missing[first : first + BLOCK]
@@ -105,8 +105,8 @@ class KeptBanks:
             cond = jax.tree.map(
                 lambda leaf, at=block: jnp.asarray(leaf[at]), self._cond
             )
-            number = jnp.full(BLOCK, chunk, jnp.int32)
-            drawn = self._bank.of(cond, self._keys[block])(number)
+            draw = self._bank.of(cond, self._keys[block])
+            drawn = draw(jnp.full(BLOCK, number, jnp.int32))
             _put(bank, part, drawn)
             there[part] = True
         return jax.tree.map(lambda leaf: leaf[rows], bank)
@@ -134,7 +134,10 @@ class Searcher:
         self._plan = sampled_search(scene, config, limits)()
 
     def __call__(
-        self, problems: Problems, rows: np.ndarray, banks: KeptBanks | None = None
+        self,
+        problems: RecordedProblems,
+        rows: np.ndarray,
+        banks: KeptBanks | None = None,
     ) -> Answers:
         """Searches some of the problems, those alike beside each other.
 

@@ -1,4 +1,4 @@
-"""Rows of questions in, paths out: padded to sizes that compile seldom, shared among threads."""
+"""Rows of problems in, paths out: padded to sizes that compile seldom, shared among threads."""
 
 import math
 import os
@@ -17,7 +17,7 @@ from jaxplan.motion.search import Search
 from jaxplan.planning import PlanResult
 
 
-class Questions(NamedTuple):
+class Batch(NamedTuple):
     """P of them, checked."""
 
     q_start: np.ndarray
@@ -31,7 +31,7 @@ class Questions(NamedTuple):
 
 
 class BatchSearch:
-    """Answers questions, many at a time.
+    """Answers problems, many at a time.
 
     Args:
         search: Of the scene.
@@ -41,8 +41,8 @@ class BatchSearch:
     def __init__(self, search: Search, sampler: Sampler | None) -> None:
         self._search, self._sampler = search, sampler
 
-    def __call__(self, asked: Questions, time_limit: float = math.inf) -> PlanResult:
-        """Answers P questions, in NumPy; what is open after `time_limit` [s] is TIME_OUT."""
+    def __call__(self, asked: Batch, time_limit: float = math.inf) -> PlanResult:
+        """Answers P problems, in NumPy; what is open after `time_limit` [s] is TIME_OUT."""
         parts, halt = _parts(len(asked.seeds)), threading.Event()
         search = partial(self._search_rows, asked, time_limit, halt.is_set)
         if len(parts) == 1:
@@ -58,7 +58,7 @@ class BatchSearch:
 
     def _search_rows(
         self,
-        asked: Questions,
+        asked: Batch,
         time_limit: float,
         stopped: Callable[[], bool],
         rows: np.ndarray,

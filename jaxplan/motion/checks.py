@@ -21,7 +21,7 @@ def seeds_of(seeds: Iterable[Any]) -> list[int]:
     try:
         given = list(seeds)
     except TypeError:
-        raise ValueError(f"seeds {shown(seeds)}, expected one a question") from None
+        raise ValueError(f"seeds {shown(seeds)}, expected one a problem") from None
     return [_seed(seed) for seed in given]
 
 
@@ -87,7 +87,7 @@ def rows(q: ArrayLike, axes: int | None, d: int, name: str) -> np.ndarray:
 
 
 def goals(q: Any, d: int) -> list[Any]:
-    """Goals of many questions, one by one: an array `[P, d]` or `[P, G, d]`, or a sequence."""
+    """Goals of many problems, one by one: an array `[P, d]` or `[P, G, d]`, or a sequence."""
     if isinstance(q, Sequence) and not isinstance(q, str):
         return [
             goal if isinstance(goal, Pose) else rows(goal, None, d, "q_goals")
@@ -110,7 +110,7 @@ def waypoints(path: ArrayLike, d: int) -> np.ndarray:
 
 
 def worlds_of(worlds: Iterable[World], ours: World, count: int) -> World | None:
-    """Worlds for each of `count` questions, stacked; None for no questions.
+    """Worlds for each of `count` problems, stacked; None for no problems.
 
     Raises:
         ValueError: One is no world of this scene, or there are more or fewer.
@@ -120,7 +120,7 @@ def worlds_of(worlds: Iterable[World], ours: World, count: int) -> World | None:
     except TypeError:
         raise ValueError(f"worlds {shown(worlds)}, expected Worlds") from None
     if len(each) != count:
-        raise ValueError(f"{len(each)} worlds for {count} questions")
+        raise ValueError(f"{len(each)} worlds for {count} problems")
     stacked: Any = map(np.stack, zip(*each, strict=True))
     return World(*stacked) if each else None
 

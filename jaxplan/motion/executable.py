@@ -1,6 +1,6 @@
 """Motions for the episode loop: repair the ends, search, smooth, time, for a batch of problems.
 
-The public `Planner` is for questions of users, one by one or in batches of any size.
+The public `Planner` is for problems of users, one by one or in batches of any size.
 """
 
 import time

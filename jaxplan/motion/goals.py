@@ -1,4 +1,4 @@
-"""Where a question may lead: a configuration, any of several, or a pose of a body."""
+"""Where a problem may lead: a configuration, any of several, or a pose of a body."""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -13,7 +13,7 @@ from jaxplan.planning import Status
 from jaxplan.scene import Scene
 
 MOST = 64
-"""Goals of a question at most: those nearest to the start."""
+"""Goals of a problem at most: those nearest to the start."""
 OF_POSE = 8
 """Configurations that a pose is planned to at most."""
 BLOCK = 256
@@ -21,14 +21,14 @@ BLOCK = 256
 
 
 class Goals(NamedTuple):
-    """The goals of one question."""
+    """The goals of one problem."""
 
     q: np.ndarray
     """`[G, d]` to plan to, from the nearest to the start on; one at least [rad or m]."""
     given: int
     """How many there were."""
     status: Status | None
-    """What the question comes to where nothing is worth a search."""
+    """What the problem comes to where nothing is worth a search."""
     blocked: np.ndarray
     """`[k, d]` those that are not free, from the nearest on."""
 
@@ -47,10 +47,10 @@ def goals_of(
     Args:
         goal: As the user gave it.
         q_start: `[d]` [rad or m].
-        scene: Of the question.
-        world: Of the question.
+        scene: Of the problem.
+        world: Of the problem.
         limits: Of the joints.
-        seed: Of the question.
+        seed: Of the problem.
         free: `[B, d] -> [B]` bool.
 
     Raises:
@@ -72,12 +72,8 @@ def goals_of(
     for first in range(0, len(q), BLOCK):
         part = np.arange(first, min(first + BLOCK, len(q)))
         ok[part] &= np.asarray(free(q[np.resize(part, BLOCK)]))[: len(part)]
-    blocked = q[inside & ~ok]
-    if ok.any():
-        return Goals(q[ok][:MOST], len(q), None, blocked)
-    if len(blocked):
-        return Goals(blocked[:1], len(q), Status.GOAL_IN_COLLISION, blocked)
-    return Goals(q[:1], len(q), None, blocked)  # the search says what is wrong with it
+    # Of what is not inside the limits, the search says what is wrong with it.
+    return _chosen(q[ok][:MOST], q[inside & ~ok], len(q), (q[:1], None))
 
 
 def _of_pose(
@@ -96,16 +92,27 @@ def _of_pose(
         scene, world, pose, limits, q_start, seed, OF_POSE, free
     )  # fmt: skip
     q, blocked = (x.astype(np.float32) for x in (found.q, found.blocked))
-    given = len(q) + len(blocked)
-    if len(q):
-        return Goals(q, given, None, blocked)
+    nowhere = q_start[None], Status.GOAL_UNREACHABLE
+    return _chosen(q, blocked, len(q) + len(blocked), nowhere)
+
+
+def _chosen(
+    ok: np.ndarray,
+    blocked: np.ndarray,
+    given: int,
+    otherwise: tuple[np.ndarray, Status | None],
+) -> Goals:
+    """Those that are free, or the nearest that is not, or `(q, status)` where there is none."""
+    if len(ok):
+        return Goals(ok, given, None, blocked)
     if len(blocked):
         return Goals(blocked[:1], given, Status.GOAL_IN_COLLISION, blocked)
-    return Goals(q_start[None], 0, Status.GOAL_UNREACHABLE, blocked)
+    q, status = otherwise
+    return Goals(q, given, status, blocked)
 
 
 def stacked(goals: list[Goals]) -> np.ndarray:
-    """`[P, G, d]`, G such that it seldom changes; a question's first goal fills it up."""
+    """`[P, G, d]`, G such that it seldom changes; a problem's first goal fills it up."""
     most = max(len(goal.q) for goal in goals)
     size = 1 << (most - 1).bit_length()
     return np.stack([goal.q[np.arange(size) % len(goal.q)] for goal in goals])

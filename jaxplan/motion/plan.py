@@ -11,7 +11,7 @@ from jaxplan.planning import Status
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Plan:
-    """The answer to one question."""
+    """The answer to one problem."""
 
     status: Status
     path: np.ndarray

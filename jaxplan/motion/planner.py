@@ -1,11 +1,11 @@
-"""The planner as a library: questions about one robot in, certified and timed motions out.
+"""The planner as a library: problems about one robot in, certified and timed motions out.
 
     scene = jaxplan.Scene.from_mjcf("robot.xml")
     planner = jaxplan.Planner(scene)
     plan = planner.plan(q_start, q_goal)
     planner.certify(plan), planner.time(plan)
 
-Statuses say what came of a question; exceptions say that it was none. The episode loop has a
+Statuses say what came of a problem; exceptions say that it was none. The episode loop has a
 planner of its own (`motion.executable`), for the same searches: its problems come in batches of
 one size, their goals are predictions that may lie a hair inside an obstacle, and what it gives
 is at once a motion to be executed.
@@ -39,8 +39,8 @@ from jaxplan.trajectory import Rung, make_trajectory
 class Planner:
     """Plans motions of one arm.
 
-    Everything compiles once, at the first question of its kind; a `World` that changes from
-    question to question compiles nothing anew.
+    Everything compiles once, at the first problem of its kind; a `World` that changes from
+    problem to problem compiles nothing anew.
 
     Args:
         scene: What can touch what.
@@ -108,7 +108,7 @@ class Planner:
     ) -> Plan:
         """Finds a collision-free path.
 
-        The same question with the same seed has the same answer, alone or in a batch, unless
+        The same problem with the same seed has the same answer, alone or in a batch, unless
         a time limit ends it.
 
         Args:
@@ -134,7 +134,7 @@ class Planner:
         worlds: World | Sequence[World] | None = None,
         time_limit: float | None = None,
     ) -> list[Plan]:
-        """Answers P questions in one call.
+        """Answers P problems in one call.
 
         Args:
             q_starts: `[P, d]` [rad or m].

@@ -1,4 +1,4 @@
-"""Why a question has no path, in a line."""
+"""Why a problem has no path, in a line."""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -19,7 +19,7 @@ ENCLOSED = 1000
 
 
 class Asked(NamedTuple):
-    """A question and its answer."""
+    """A problem and its answer."""
 
     scene: Scene
     plan: Plan

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from jaxplan.collision import World
 from jaxplan.config import PlannerConfig
 from jaxplan.ik import Limits, Pose
-from jaxplan.motion.batch import BatchSearch, Questions
+from jaxplan.motion.batch import Batch, BatchSearch
 from jaxplan.motion.goals import Goals, goals_of, stacked
 from jaxplan.motion.plan import Plan
 from jaxplan.motion.reasons import Asked, no_path
@@ -94,7 +94,7 @@ class Solver:
         if not method_of(self._config).goal_sets:
             read = [goal._replace(q=goal.q[:1]) for goal in read]
         left = max(time_limit - (time.perf_counter() - began), LEAST_TIME)
-        answer = self._answers(Questions(start, stacked(read), seeds, world, own), left)
+        answer = self._answers(Batch(start, stacked(read), seeds, world, own), left)
         seconds = time.perf_counter() - began
         return [
             self._plan(
@@ -133,7 +133,7 @@ class Solver:
             world=world,
         )
         near = dataclasses.replace(plan, path=np.asarray(path))
-        question = Asked(
+        problem = Asked(
             self._scene,
             near,
             q_start,
@@ -142,4 +142,4 @@ class Solver:
             self._config.margin,
             np.asarray(answer.nodes),
         )
-        return dataclasses.replace(plan, reason=no_path(question))
+        return dataclasses.replace(plan, reason=no_path(problem))

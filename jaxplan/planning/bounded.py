@@ -18,18 +18,18 @@ import jax.numpy as jnp
 
 from jaxplan.planning.proposal import Draw
 from jaxplan.planning.space import Space, dot, norm, rounded
-from jaxplan.planning.state import Control, Query
+from jaxplan.planning.state import Control, Problem
 from jaxplan.planning.tree import Tree, at
 
 
 def informed(
-    draw: Draw, query: Query, side: jax.Array, space: Space
+    draw: Draw, problems: Problem, side: jax.Array, space: Space
 ) -> tuple[Draw, jax.Array]:
     """The draw with its sample inside the ellipsoid, and the most that the sample may cost.
 
     Args:
         draw: Random numbers of `[P, K]` workers.
-        query: P problems.
+        problems: `[P]`.
         side: `[P, K]` the tree that moves.
         space: Of the configurations. Where joints come round there are many ways to the goal,
             and no ellipsoid holds them all: the whole space is sampled then.
@@ -37,14 +37,14 @@ def informed(
     Returns:
         The draw, and `[P, K]` a cost, counted from the root of the tree that moves.
     """
-    start, goal = query.q_start[:, None], query.q_goal[:, None]
+    start, goal = problems.q_start[:, None], problems.q_goal[:, None]
     d = start.shape[-1]
     # The uniform numbers that gave q_rand are free: the ellipsoid has its own.
     uniform = draw.uniform
     ball = draw.segment.direction * uniform[..., :1] ** (1 / d)
     gap = goal - start
     across = norm(gap)[..., None]
-    bound = query.bound[:, None]
+    bound = problems.bound[:, None]
     long = jnp.maximum(bound[..., None], across)
     finite = jnp.where(jnp.isfinite(long), long, 1.0)
     short = jnp.sqrt(jnp.maximum(finite**2 - across**2, 0))
@@ -61,7 +61,7 @@ def informed(
     if not space.turns:
         q_rand = jnp.where(narrow[..., None], inside, q_rand)
 
-    own, other = _roots(query, side)
+    own, other = _roots(problems, side)
     least = space.distance(q_rand, own)
     room = bound - space.distance(q_rand, other) - least
     share = uniform[..., min(1, d - 1)]
@@ -75,7 +75,7 @@ def admits(
     reached: jax.Array,
     control: Control,
     tree: Tree,
-    query: Query,
+    problems: Problem,
     space: Space,
 ) -> jax.Array:
     """`[P, K]` whether a path within the bound may lead through new nodes.
@@ -86,18 +86,18 @@ def admits(
         reached: `[P, K]` they are what their moves aimed at.
         control: Of the workers.
         tree: Search trees.
-        query: P problems.
+        problems: `[P]`.
         space: Of the configurations.
     """
-    _, other = _roots(query, control.side)
+    _, other = _roots(problems, control.side)
     rest = space.distance(q_new, other)
     meets = control.connecting & ~control.following & reached
     rest = jnp.where(meets, at(tree.cost, control.aim), rest)
-    return cost + rest < query.bound[:, None]
+    return cost + rest < problems.bound[:, None]
 
 
-def _roots(query: Query, side: jax.Array) -> tuple[jax.Array, jax.Array]:
+def _roots(problems: Problem, side: jax.Array) -> tuple[jax.Array, jax.Array]:
     """`[P, K, d]` the root of the tree that moves, and that of the other."""
     forward = (side == 0)[..., None]
-    start, goal = query.q_start[:, None], query.q_goal[:, None]
+    start, goal = problems.q_start[:, None], problems.q_goal[:, None]
     return jnp.where(forward, start, goal), jnp.where(forward, goal, start)

@@ -1,4 +1,4 @@
-"""Both ends of a search: what the questions are worth, and what is read out of the trees."""
+"""Both ends of a search: what the problems are worth, and what is read out of the trees."""
 
 import jax
 import jax.numpy as jnp
@@ -8,7 +8,7 @@ from jaxplan.config import PlannerConfig
 from jaxplan.planning.methods import method_of
 from jaxplan.planning.result import PlanResult, Status
 from jaxplan.planning.space import Space
-from jaxplan.planning.state import Query, State
+from jaxplan.planning.state import Problem, State
 from jaxplan.planning.tree import extract_path, sizes
 
 LIMIT_SLACK = 1e-4
@@ -17,30 +17,30 @@ MAX_WAYPOINTS = 512
 """A longer path does not count as found."""
 
 
-def examine(query: Query, space: Space) -> tuple[Query, jax.Array]:
-    """Checks all of the questions but for collisions.
+def examine(problems: Problem, space: Space) -> tuple[Problem, jax.Array]:
+    """Checks all of the problems but for collisions.
 
     Args:
-        query: P problems.
+        problems: `[P]`.
         space: Of the configurations.
 
     Returns:
-        The query, finite everywhere, and `[P]` statuses: BUDGET_EXHAUSTED where there is
+        The problems, finite everywhere, and `[P]` statuses: BUDGET_EXHAUSTED where there is
         something to search.
     """
-    given = jnp.stack([*query[:3], *jnp.moveaxis(query.goals, 1, 0)])
+    given = jnp.stack([*problems[:3], *jnp.moveaxis(problems.goals, 1, 0)])
     finite = jnp.all(jnp.isfinite(given), axis=(0, 2))
     inside = np.clip(0.0, space.q_min, space.q_max)
     given = jnp.where(finite[:, None], given, inside)
     q_start, q_goal, q_toggle = given[:3]
     goals = jnp.moveaxis(given[3:], 0, 1)
-    query = Query(q_start, q_goal, q_toggle, query.key, query.bound, goals)
+    problems = Problem(q_start, q_goal, q_toggle, problems.key, problems.bound, goals)
     ends = jnp.stack([q_start, q_goal, *given[3:]])
     over = (ends < space.q_min - LIMIT_SLACK) | (ends > space.q_max + LIMIT_SLACK)
     over = jnp.any(over, axis=(0, 2))
     status = jnp.where(over, Status.OUT_OF_LIMITS, Status.BUDGET_EXHAUSTED)
     status = jnp.where(finite, status, Status.INVALID_INPUT)
-    return query, status.astype(jnp.int32)
+    return problems, status.astype(jnp.int32)
 
 
 def waypoints(config: PlannerConfig) -> int:
@@ -51,7 +51,7 @@ def waypoints(config: PlannerConfig) -> int:
 def finish(state: State, space: Space, config: PlannerConfig) -> PlanResult:
     """Reads the paths out of the trees."""
     method = method_of(config)
-    node, joint = method.ends(state.tree, state.control, state.query, space)
+    node, joint = method.ends(state.tree, state.control, state.problems, space)
     searched = state.status <= Status.BUDGET_EXHAUSTED
     node, joint = jnp.where(searched, node, -1), jnp.where(searched, joint, -1)
     path, path_length = extract_path(state.tree, node, joint, waypoints(config))

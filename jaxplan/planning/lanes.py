@@ -26,7 +26,7 @@ from jaxplan.planning.result import PlanResult, Status
 from jaxplan.planning.segment import Segment
 from jaxplan.planning.soundness import check_ends_and_paths
 from jaxplan.planning.space import Space, norm
-from jaxplan.planning.state import Query, State, searching
+from jaxplan.planning.state import Problem, State, searching
 from jaxplan.planning.sweep import SweptFree
 
 SHORTER = 0.999
@@ -48,31 +48,31 @@ class Lanes(NamedTuple):
     """Of the problems; what is not over yet is empty."""
 
 
-def empty(query: Query, lanes: int, space: Space, config: PlannerConfig) -> Lanes:
-    """Lanes that search nothing, for questions like those of `query`.
+def empty(problems: Problem, lanes: int, space: Space, config: PlannerConfig) -> Lanes:
+    """Lanes that search nothing, for problems like these.
 
     Args:
-        query: P problems.
+        problems: `[P]`.
         lanes: L, at most P.
         space: Of the configurations.
         config: Planner settings.
     """
-    problems, d = query.q_start.shape
-    first = jax.tree.map(lambda leaf: leaf[:lanes], query)
-    zero = jnp.zeros(problems, jnp.int32)
+    count, d = problems.q_start.shape
+    first = jax.tree.map(lambda leaf: leaf[:lanes], problems)
+    zero = jnp.zeros(count, jnp.int32)
     answers = PlanResult(
-        path=jnp.zeros((problems, ends.waypoints(config), d)),
+        path=jnp.zeros((count, ends.waypoints(config), d)),
         path_length=zero,
         status=zero,
         expansions=zero,
         accepted=zero,
         learned=zero,
         checks=zero,
-        nodes=jnp.zeros((problems, 2), jnp.int32),
+        nodes=jnp.zeros((count, 2), jnp.int32),
     )
     return Lanes(
         state=search.empty(first, space, config),
-        problem=jnp.full(lanes, problems, jnp.int32),
+        problem=jnp.full(lanes, count, jnp.int32),
         fresh=jnp.zeros(lanes, bool),
         taken=jnp.int32(lanes),
         answers=answers,
@@ -82,7 +82,7 @@ def empty(query: Query, lanes: int, space: Space, config: PlannerConfig) -> Lane
 def begin(
     lanes: Lanes,
     new: jax.Array,
-    query: Query,
+    problems: Problem,
     status: jax.Array,
     space: Space,
     config: PlannerConfig,
@@ -92,7 +92,7 @@ def begin(
     Args:
         lanes: From `empty`, or of other problems that are over; else they stay as they are.
         new: Whether the problems are others than before.
-        query: P problems.
+        problems: `[P]`.
         status: `[P]` from `ends.examine`.
         space: Of the configurations.
         config: Planner settings.
@@ -100,7 +100,7 @@ def begin(
     count = len(lanes.problem)
     problem, every = jnp.arange(count, dtype=jnp.int32), jnp.ones(count, bool)
     where = every & new
-    loaded = _load(query, status, problem)
+    loaded = _load(problems, status, problem)
     state = search.start(lanes.state, where, *loaded, space, config)
     state = _counted_anew(state, where)
     nothing = jax.tree.map(jnp.zeros_like, lanes.answers)._replace(status=status)
@@ -111,7 +111,7 @@ def begin(
 
 def run(
     lanes: Lanes,
-    query: Query,
+    problems: Problem,
     status: jax.Array,
     bank: Segment | None,
     config_free: ConfigFree,
@@ -125,7 +125,7 @@ def run(
 
     Args:
         lanes: From `begin` or an earlier `run`.
-        query: P problems.
+        problems: `[P]`.
         status: `[P]` from `ends.examine`.
         bank: As for `search.advance`, of the lanes.
         config_free: The check of configurations; `problem` counts the P problems.
@@ -136,7 +136,7 @@ def run(
         space: Of the configurations.
         config: Planner settings.
     """
-    problems = len(status)
+    count = len(status)
 
     def going(lanes: Lanes) -> jax.Array:
         return searching(lanes.state, config) & ~stop
@@ -145,7 +145,7 @@ def run(
         return going(lanes) & ~lanes.state.waiting & ~lanes.fresh
 
     def due(lanes: Lanes) -> jax.Array:
-        return (lanes.fresh | ~going(lanes)) & (lanes.problem < problems)
+        return (lanes.fresh | ~going(lanes)) & (lanes.problem < count)
 
     def turn(carry: tuple[jax.Array, Lanes]) -> tuple[jax.Array, Lanes]:
         number, lanes = carry
@@ -154,7 +154,7 @@ def run(
             return _harvest(
                 lanes,
                 due(lanes),
-                query,
+                problems,
                 status,
                 (config_free, swept_free),
                 stop,
@@ -163,7 +163,7 @@ def run(
             )
 
         lanes = jax.lax.cond(jnp.any(due(lanes)), harvest, lambda same: same, lanes)
-        here = jnp.minimum(lanes.problem, problems - 1)
+        here = jnp.minimum(lanes.problem, count - 1)
 
         def free(lane: jax.Array, q: jax.Array) -> jax.Array:
             return config_free(here[lane], q)
@@ -181,31 +181,31 @@ def run(
 
 
 def _load(
-    query: Query, status: jax.Array, problem: jax.Array
-) -> tuple[Query, jax.Array]:
-    """The questions of `problem [L]`; a lane without one has nothing to search."""
+    problems: Problem, status: jax.Array, problem: jax.Array
+) -> tuple[Problem, jax.Array]:
+    """Those of `problem [L]`; a lane without one has nothing to search."""
     row = jnp.minimum(problem, len(status) - 1)
-    query = jax.tree.map(lambda leaf: leaf[row], query)
-    return query, jnp.where(problem < len(status), status[row], Status.INACTIVE)
+    problems = jax.tree.map(lambda leaf: leaf[row], problems)
+    return problems, jnp.where(problem < len(status), status[row], Status.INACTIVE)
 
 
 def _harvest(
     lanes: Lanes,
     due: jax.Array,
-    query: Query,
+    problems: Problem,
     status: jax.Array,
     checks: tuple[ConfigFree, SweptFree | None],
     stop: jax.Array,
     space: Space,
     config: PlannerConfig,
 ) -> Lanes:
-    """Looks after the lanes that are `due [L]`: a new question, or an answer to write down."""
-    state, problems = lanes.state, len(status)
+    """Looks after the lanes that are `due [L]`: a new problem, or an answer to write down."""
+    state, count = lanes.state, len(status)
     found = ends.finish(state, space, config)
     opening = due & lanes.fresh & (state.status == Status.BUDGET_EXHAUSTED)
     solved = due & ~lanes.fresh & (found.status == Status.SOLVED)
     sound, start_free, goal_free = check_ends_and_paths(
-        state.query, lanes.problem, found, opening, solved, checks, config
+        state.problems, lanes.problem, found, opening, solved, checks, config
     )
     opened = jnp.where(goal_free, state.status, Status.GOAL_IN_COLLISION)
     opened = jnp.where(start_free, opened, Status.START_IN_COLLISION)
@@ -215,22 +215,22 @@ def _harvest(
         path_length=jnp.where(sound, found.path_length, 1),
     )
     more = (state.expansions < config.max_expansions) & ~stop
-    anew, bound = ~sound & more, state.query.bound
+    anew, bound = ~sound & more, state.problems.bound
     if method_of(config).optimises:
         # Until the budget is used, or the path is straight.
         gaps = norm(found.path[:, 1:] - found.path[:, :-1])
         bound = jnp.where(solved & sound, SHORTER * jnp.sum(gaps, axis=1), bound)
-        straight = space.distance(state.query.q_start, state.query.q_goal)
+        straight = space.distance(state.problems.q_start, state.problems.q_goal)
         anew |= solved & more & (bound > straight)
     done = due & ~lanes.fresh & ~anew
     answers = _write(
-        lanes, found, done, due & ~lanes.fresh & sound & solved, problems, config
+        lanes, found, done, due & ~lanes.fresh & sound & solved, count, config
     )
     problem = lanes.taken + jnp.cumsum(done, dtype=jnp.int32) - 1
-    problem = jnp.where(done, jnp.minimum(problem, problems), lanes.problem)
-    loaded = done & (problem < problems)
+    problem = jnp.where(done, jnp.minimum(problem, count), lanes.problem)
+    loaded = done & (problem < count)
     begins = loaded | anew
-    asked, known = _load(query, status, problem)
+    asked, known = _load(problems, status, problem)
     asked = asked._replace(bound=jnp.where(anew, bound, jnp.inf))
     state = search.start(state, begins, asked, known, space, config)
     # A new attempt goes on counting, and so draws other random numbers.
@@ -246,7 +246,7 @@ def _harvest(
 
 def _counted_anew(state: State, where: jax.Array) -> State:
     """All counters are 0 `where [L]` a problem is another one."""
-    for name in ("chunk", "used", "expansions", "accepted", "checks", "attempt"):
+    for name in ("bank_number", "used", "expansions", "accepted", "checks", "attempt"):
         count = jnp.where(where, 0, getattr(state, name))
         state = state._replace(**{name: count})
     return state
@@ -257,16 +257,16 @@ def _write(
     found: PlanResult,
     done: jax.Array,
     better: jax.Array,
-    problems: int,
+    count: int,
     config: PlannerConfig,
 ) -> PlanResult:
     """The answers, with those of the lanes that are `done [L]`, or have a `better [L]` path."""
-    first = jnp.isinf(lanes.state.query.bound)
+    first = jnp.isinf(lanes.state.problems.bound)
     path = better | (done & first) if method_of(config).optimises else done
     own = {"path": path, "path_length": path, "status": path}
 
     def write(name: str) -> jax.Array:
-        row = jnp.where(own.get(name, done | path), lanes.problem, problems)
+        row = jnp.where(own.get(name, done | path), lanes.problem, count)
         leaf = getattr(lanes.answers, name)
         return leaf.at[row].set(getattr(found, name), mode="drop")
 

@@ -28,7 +28,7 @@ from jaxplan.planning.result import PlanResult, Status
 from jaxplan.planning.segment import DrawBank, Segment
 from jaxplan.planning.settings import check_settings
 from jaxplan.planning.space import Space
-from jaxplan.planning.state import Query
+from jaxplan.planning.state import Problem
 
 Worlds = Any
 FIRST_SLICE = 32
@@ -86,18 +86,18 @@ def make_planner(
         worlds: Worlds,
         state: lanes.Lanes,
         new: jax.Array,
-        query: Query,
+        problems: Problem,
         active: jax.Array,
         bank: Segment | None,
         rounds: jax.Array,
         stop: jax.Array,
     ) -> lanes.Lanes:
-        query, status = ends.examine(query, space)
+        problems, status = ends.examine(problems, space)
         status = jnp.where(active, status, Status.INACTIVE).astype(jnp.int32)
-        state = lanes.begin(state, new, query, status, space, config)
+        state = lanes.begin(state, new, problems, status, space, config)
         if bank is not None:  # there is none yet
-            chunk = jnp.where(new, -1, state.state.chunk)
-            state = state._replace(state=state.state._replace(chunk=chunk))
+            bank_number = jnp.where(new, -1, state.state.bank_number)
+            state = state._replace(state=state.state._replace(bank_number=bank_number))
 
         def free(problem, q):
             return config_free(worlds, problem, q)
@@ -108,33 +108,33 @@ def make_planner(
 
         proof = None if swept_free is None else swept
         return lanes.run(
-            state, query, status, bank, free, proof, rounds, stop, space, config
+            state, problems, status, bank, free, proof, rounds, stop, space, config
         )
 
     @jit
-    def empty(query: Query, bank: Segment | None) -> lanes.Lanes:
+    def empty(problems: Problem, bank: Segment | None) -> lanes.Lanes:
         # With a bank a lane for each problem: the sampler's banks are by problem.
-        count = len(query.q_start)
+        count = len(problems.q_start)
         rows = count if bank is not None else min(count, config.lanes)
-        return lanes.empty(query, rows, space, config)
+        return lanes.empty(problems, rows, space, config)
 
     advance = jit(run, donate_argnums=1)
     used: dict[tuple[int, ...], list[lanes.Lanes]] = {}
-    """Lanes of single problems that are over: getting memory is a good part of a question."""
+    """Lanes of single problems that are over: getting memory is a good part of a search."""
     seen: list[tuple[int, bool]] = []
     """M, and whether segments have bases, once a bank was seen."""
 
-    def first_bank(draw: DrawBank | None, problems: int) -> Any:
+    def first_bank(draw: DrawBank | None, count: int) -> Any:
         """A bank that nobody reads: whoever asks for a segment waits for the first one."""
         if draw is None or config.p_uniform >= 1:
             return None
         if not seen:
-            bank = draw(jnp.zeros(problems, jnp.int32))
+            bank = draw(jnp.zeros(count, jnp.int32))
             seen.append((bank.length.shape[1], bank.base is not None))
         rows, based = seen[0]
         if rows < config.workers:
             raise ValueError(f"a bank of {rows} segments for {config.workers} workers")
-        q = jnp.zeros((problems, rows, d))
+        q = jnp.zeros((count, rows, d))
         return Segment(q, q[..., 0], q if based else None)
 
     def plan(
@@ -151,19 +151,19 @@ def make_planner(
     ) -> PlanResult:
         nonlocal pace
         end = time.perf_counter() + time_limit
-        query = _query(q_start, q_goal, q_toggle, keys, goals, d)
-        problems = len(query.q_start)
-        if query.goals.shape[1] and not method_of(config).goal_sets:
+        problems = _problems(q_start, q_goal, q_toggle, keys, goals, d)
+        count = len(problems.q_start)
+        if problems.goals.shape[1] and not method_of(config).goal_sets:
             raise ValueError(f"{config.method} has one goal; several need rrt_connect")
-        active = np.ones(problems, bool) if active is None else np.asarray(active, bool)
-        bank = first_bank(draw, problems)
-        kept = used.setdefault((problems, query.goals.shape[1], bank is None), [])
-        state = kept.pop() if kept else empty(query, bank)
+        active = np.ones(count, bool) if active is None else np.asarray(active, bool)
+        bank = first_bank(draw, count)
+        kept = used.setdefault((count, problems.goals.shape[1], bank is None), [])
+        state = kept.pop() if kept else empty(problems, bank)
         new, go, halt = np.True_, np.False_, np.True_
 
         def over(state: lanes.Lanes) -> PlanResult:
             answers = jax.tree.map(np.array, state.answers)
-            if problems == 1:
+            if count == 1:
                 kept.append(state)
             return answers
 
@@ -173,23 +173,23 @@ def make_planner(
             wanted = SLICE if left > 2 * SLICE else min(LAST_SLICE, left / 2)
             rounds = FIRST_SLICE if math.isinf(pace) else wanted / pace
             rounds = np.int32(np.clip(rounds, 1, 2**30))
-            state = advance(worlds, state, new, query, active, bank, rounds, go)
+            state = advance(worlds, state, new, problems, active, bank, rounds, go)
             new = np.False_
             problem = np.asarray(state.problem)
-            open_ = problem < problems
+            open_ = problem < count
             if not open_.any():
                 return over(state)
             if np.asarray(state.state.waiting).any():
                 assert draw is not None
-                bank = draw(state.state.chunk)
+                bank = draw(state.state.bank_number)
             now = time.perf_counter()
             pace = max((now - began) / rounds, 1e-7)
             if now >= end or (stopped is not None and stopped()):
                 break
-        late = np.zeros(problems, bool)
+        late = np.zeros(count, bool)
         late[problem[open_]] = late[int(state.taken) :] = True
         last = np.int32(2**30)
-        answers = over(advance(worlds, state, new, query, active, bank, last, halt))
+        answers = over(advance(worlds, state, new, problems, active, bank, last, halt))
         late &= answers.status == Status.BUDGET_EXHAUSTED
         status = np.where(late, Status.TIME_OUT, answers.status).astype(np.int32)
         return answers._replace(status=status)
@@ -197,10 +197,10 @@ def make_planner(
     return plan
 
 
-def _query(q_start, q_goal, q_toggle, keys, goals, d: int) -> Query:
-    """The questions, checked."""
+def _problems(q_start, q_goal, q_toggle, keys, goals, d: int) -> Problem:
+    """The problems, checked."""
     unbounded: Any = np.full(len(keys), np.inf, np.float32)
-    query = Query(
+    problems = Problem(
         _batch(q_start, d, "q_start"),
         _batch(q_goal, d, "q_goal"),
         _batch(q_toggle, d, "q_toggle"),
@@ -210,11 +210,11 @@ def _query(q_start, q_goal, q_toggle, keys, goals, d: int) -> Query:
         if goals is None
         else np.asarray(goals, np.float32),
     )
-    problems = len(query.q_start)
-    if {len(q) for q in query} != {problems}:
-        sizes = [len(q) for q in query[:4]]
+    count = len(problems.q_start)
+    if {len(q) for q in problems} != {count}:
+        sizes = [len(q) for q in problems[:4]]
         raise ValueError(f"q_start, q_goal, q_toggle, keys have lengths {sizes}")
-    return query
+    return problems
 
 
 def _batch(q, d: int, name: str) -> Any:

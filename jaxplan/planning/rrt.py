@@ -15,24 +15,26 @@ from jaxplan.planning.method import Method
 from jaxplan.planning.proposal import Draw, mixture
 from jaxplan.planning.segment import Segment, straightened
 from jaxplan.planning.space import Space
-from jaxplan.planning.state import Control, Move, Outcome, Query
+from jaxplan.planning.state import Control, Move, Outcome, Problem
 from jaxplan.planning.tree import Tree, nearest
 
 
-def roots(query: Query) -> jax.Array:
+def roots(problems: Problem) -> jax.Array:
     """`[P, 1, d]` the only tree starts at q_start."""
-    return query.q_start[:, None]
+    return problems.q_start[:, None]
 
 
-def begin(query: Query, space: Space, config: PlannerConfig) -> Control:
+def begin(problems: Problem, space: Space, config: PlannerConfig) -> Control:
     """The root is the first accepted node, and the first worker's."""
-    shape = len(query.q_start), config.workers
+    shape = len(problems.q_start), config.workers
     zero, first = jnp.zeros(shape, jnp.int32), jnp.arange(config.workers) == 0
-    gap = space.distance(query.q_start, query.q_goal)[:, None]
+    gap = space.distance(problems.q_start, problems.q_goal)[:, None]
     connecting = first & (gap > 0) & (gap <= config.goal_connect)
     solved = first & ~connecting & (gap <= config.goal_tolerance)
     no = jnp.zeros(shape, bool)
-    q_aim = jnp.broadcast_to(query.q_goal[:, None], (*shape, query.q_goal.shape[-1]))
+    q_aim = jnp.broadcast_to(
+        problems.q_goal[:, None], (*shape, problems.q_goal.shape[-1])
+    )
     return Control(zero, connecting, no, connecting, zero, zero, q_aim, solved)
 
 
@@ -47,11 +49,11 @@ def propose(
     draw: Draw,
     asking: jax.Array,
     segment: Segment,
-    query: Query,
+    problems: Problem,
     config: PlannerConfig,
 ) -> Move:
     """A proposal of the mixture, or the next straight step."""
-    q_goal = query.q_goal[:, None]
+    q_goal = problems.q_goal[:, None]
     proposal, learned = mixture(draw, asking, segment, q_goal, config)
     move = straightened(proposal, control.connecting, control.q_aim, config.step_max)
     return Move(move, learned)
@@ -60,14 +62,14 @@ def propose(
 def advance(
     control: Control,
     outcome: Outcome,
-    query: Query,
+    problems: Problem,
     tree: Tree,
     space: Space,
     config: PlannerConfig,
 ) -> Control:
     """What follows an accepted or a rejected move."""
     del tree
-    ok, q_goal = outcome.accepted, query.q_goal[:, None]
+    ok, q_goal = outcome.accepted, problems.q_goal[:, None]
     gap_new = space.distance(outcome.q_new, q_goal)
     gap_base = space.distance(outcome.q_base, q_goal)
     was = control.connecting & ~control.following
@@ -87,11 +89,11 @@ def advance(
 
 
 def ends(
-    tree: Tree, control: Control, query: Query, space: Space
+    tree: Tree, control: Control, problems: Problem, space: Space
 ) -> tuple[jax.Array, jax.Array]:
     """The best node reached, q_reach, and no second tree to go on in; `[P]` each."""
     side = jnp.zeros_like(control.side[:, :1])
-    best = nearest(tree, side, query.q_goal[:, None], space)[0][:, 0]
+    best = nearest(tree, side, problems.q_goal[:, None], space)[0][:, 0]
     return best, jnp.full_like(best, -1)
 
 

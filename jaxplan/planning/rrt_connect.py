@@ -22,26 +22,26 @@ from jaxplan.planning.method import Method
 from jaxplan.planning.proposal import Draw, mixture
 from jaxplan.planning.segment import Segment, straightened
 from jaxplan.planning.space import Space
-from jaxplan.planning.state import Control, Move, Outcome, Query, choose
+from jaxplan.planning.state import Control, Move, Outcome, Problem, choose
 from jaxplan.planning.tree import Tree, at, nearest, sizes
 
 START, GOAL = 0, 1
 
 
-def roots(query: Query) -> jax.Array:
+def roots(problems: Problem) -> jax.Array:
     """`[P, 1 + G, d]` one tree at q_start, and one at q_goal and the other goals."""
-    ends = jnp.stack([query.q_start, query.q_goal], axis=1)
-    return jnp.concatenate([ends, query.goals], axis=1)
+    ends = jnp.stack([problems.q_start, problems.q_goal], axis=1)
+    return jnp.concatenate([ends, problems.goals], axis=1)
 
 
-def begin(query: Query, space: Space, config: PlannerConfig) -> Control:
+def begin(problems: Problem, space: Space, config: PlannerConfig) -> Control:
     """A worker for each goal connects the start's tree to it; the others grow, in turn."""
     del space
-    shape = len(query.q_start), config.workers
+    shape = len(problems.q_start), config.workers
     zero, worker = jnp.zeros(shape, jnp.int32), jnp.arange(config.workers)
     no = jnp.zeros(shape, bool)
     side = jnp.broadcast_to((worker % 2).astype(jnp.int32), shape)
-    ends = roots(query)
+    ends = roots(problems)
     straight = worker < ends.shape[1] - 1
     aim = jnp.broadcast_to(jnp.where(straight, worker + GOAL, GOAL), shape)
     q_aim = ends[:, aim[0]]
@@ -60,13 +60,15 @@ def propose(
     draw: Draw,
     asking: jax.Array,
     segment: Segment,
-    query: Query,
+    problems: Problem,
     config: PlannerConfig,
 ) -> Move:
     """A proposal of the mixture, mirrored in the goal's tree, or the next straight step."""
     forward = control.side == START
     segment = choose(forward, segment, segment.reversed())
-    root = jnp.where(forward[..., None], query.q_goal[:, None], query.q_start[:, None])
+    root = jnp.where(
+        forward[..., None], problems.q_goal[:, None], problems.q_start[:, None]
+    )
     proposal, learned = mixture(draw, asking, segment, root, config)
     move = straightened(proposal, control.connecting, control.q_aim, config.step_max)
     return Move(move, learned)
@@ -75,13 +77,13 @@ def propose(
 def advance(
     control: Control,
     outcome: Outcome,
-    query: Query,
+    problems: Problem,
     tree: Tree,
     space: Space,
     config: PlannerConfig,
 ) -> Control:
     """What follows an accepted or a rejected move."""
-    del query, space
+    del problems, space
     ok, was = outcome.accepted, control.connecting & ~control.following
     met = was & ok & outcome.reached
     following = ok & outcome.follows & ~outcome.reached
@@ -114,11 +116,11 @@ def advance(
 
 
 def ends(
-    tree: Tree, control: Control, query: Query, space: Space
+    tree: Tree, control: Control, problems: Problem, space: Space
 ) -> tuple[jax.Array, jax.Array]:
     """`[P]` the node where the trees meet, in either tree; unsolved: the best one, and none."""
     side = jnp.zeros_like(control.side[:, :1])
-    best = nearest(tree, side, query.q_goal[:, None], space)[0][:, 0]
+    best = nearest(tree, side, problems.q_goal[:, None], space)[0][:, 0]
     first = jnp.argmax(control.solved, axis=1)[:, None]
     newest, aim, side = (
         jnp.take_along_axis(leaf, first, axis=1)[:, 0]

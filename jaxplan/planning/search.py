@@ -10,7 +10,7 @@ With one worker this is the textbook algorithm, and `expansions` counts what the
 counts. More workers find a way in fewer rounds, as one block of threads each does in
 pRRTC (arXiv 2503.06757), at the price of expansions that know nothing of each other.
 
-Everything about a problem depends on its own question, key and settings: neither on the
+Everything about a problem depends on its own ends, key and settings: neither on the
 other problems of a batch nor on its place among them.
 """
 
@@ -25,7 +25,7 @@ from jaxplan.planning.proposal import draw_numbers
 from jaxplan.planning.result import Status
 from jaxplan.planning.segment import Segment, extend
 from jaxplan.planning.space import Space, norm
-from jaxplan.planning.state import Move, Outcome, Query, State, choose
+from jaxplan.planning.state import Move, Outcome, Problem, State, choose
 from jaxplan.planning.tree import (
     at,
     bare,
@@ -45,18 +45,18 @@ FINEST = 8
 """Halvings of the resolution at most."""
 
 
-def empty(query: Query, space: Space, config: PlannerConfig) -> State:
-    """A state that searches nothing, for questions like those of `query [P]`."""
-    problems, joints = query.q_start.shape
-    zero = jnp.zeros(problems, jnp.int32)
-    roots = method_of(config).roots(query).shape[1]
+def empty(problems: Problem, space: Space, config: PlannerConfig) -> State:
+    """A state that searches nothing, for problems like these `[P]`."""
+    count, joints = problems.q_start.shape
+    zero = jnp.zeros(count, jnp.int32)
+    roots = method_of(config).roots(problems).shape[1]
     return State(
-        query=query,
-        tree=bare(problems, joints, config.max_expansions + roots),
-        control=method_of(config).begin(query, space, config),
-        status=jnp.full(problems, int(Status.INACTIVE), jnp.int32),
+        problems=problems,
+        tree=bare(count, joints, config.max_expansions + roots),
+        control=method_of(config).begin(problems, space, config),
+        status=jnp.full(count, int(Status.INACTIVE), jnp.int32),
         waiting=jnp.zeros_like(zero, bool),
-        chunk=zero,
+        bank_number=zero,
         used=zero,
         expansions=zero,
         accepted=zero,
@@ -68,7 +68,7 @@ def empty(query: Query, space: Space, config: PlannerConfig) -> State:
 def start(
     state: State,
     where: jax.Array,
-    query: Query,
+    problems: Problem,
     status: jax.Array,
     space: Space,
     config: PlannerConfig,
@@ -78,18 +78,18 @@ def start(
     Args:
         state: From `empty` or a search.
         where: `[P]` which rows begin anew.
-        query: `[P]` their questions.
+        problems: `[P]`.
         status: `[P]` BUDGET_EXHAUSTED where there is something to search.
         space: Of the configurations.
         config: Planner settings.
     """
     method = method_of(config)
-    control = method.begin(query, space, config)
+    control = method.begin(problems, space, config)
     found = (status == Status.BUDGET_EXHAUSTED) & jnp.any(control.solved, axis=1)
     status = jnp.where(found, Status.SOLVED, status).astype(jnp.int32)
     return state._replace(
-        query=choose(where, query, state.query),
-        tree=plant(state.tree, method.roots(query), where),
+        problems=choose(where, problems, state.problems),
+        tree=plant(state.tree, method.roots(problems), where),
         control=choose(where, control, state.control),
         status=jnp.where(where, status, state.status),
         waiting=state.waiting & ~where,
@@ -109,7 +109,7 @@ def advance(
     Args:
         state: From `start` or an earlier round.
         able: `[P]` which problems take part.
-        bank: `[P, M]` segments, M >= K, of each problem those from `state.chunk * M` on.
+        bank: `[P, M]` segments, M >= K, of each problem those from `state.bank_number * M` on.
             None: uniform proposals only. Bases count with `tree_context` only.
         config_free: The check of configurations.
         space: Of the configurations.
@@ -118,14 +118,14 @@ def advance(
     Returns:
         The state; a problem that is `waiting` now needs the next `M` segments first.
     """
-    method, control, query = method_of(config), state.control, state.query
+    method, control, problems = method_of(config), state.control, state.problems
     worker = jnp.arange(config.workers, dtype=jnp.int32)
     number = state.expansions[:, None] + worker
-    box = space.box(query.q_start[:, None], query.q_goal[:, None])
-    draw = draw_numbers(query.key, number, box, config)
+    box = space.box(problems.q_start[:, None], problems.q_goal[:, None])
+    draw = draw_numbers(problems.key, number, box, config)
     most = None
     if method.optimises:
-        draw, most = bounded.informed(draw, query, control.side, space)
+        draw, most = bounded.informed(draw, problems, control.side, space)
         most = jnp.where(control.connecting, jnp.inf, most)
     running = able[:, None] & (number < config.max_expansions)
     running &= worker < _width(state, config)[:, None]
@@ -136,14 +136,14 @@ def advance(
         asking = running & method.asks(control, draw, config)
         rows = bank.length.shape[1]
         row = state.used[:, None] + jnp.cumsum(asking, axis=1) - 1
-        row -= state.chunk[:, None] * rows
+        row -= state.bank_number[:, None] * rows
         waiting = able & jnp.any(asking & (row >= rows), axis=1)
         running, asking = (x & ~waiting[:, None] for x in (running, asking))
         row = jnp.clip(row, 0, rows - 1)
         bank = bank if config.tree_context else bank._replace(base=None)
         segment = jax.tree.map(lambda leaf: at(leaf, row), bank)
 
-    move = method.propose(control, draw, asking, segment, query, config)
+    move = method.propose(control, draw, asking, segment, problems, config)
     follows = jnp.where(
         move.learned, segment.base is not None, config.greedy & move.proposal.toward
     )
@@ -163,7 +163,9 @@ def advance(
     moves = reached | (length > 1e-6)
     if method.optimises:
         moves &= known | control.chained
-        moves &= bounded.admits(cost, q_new, reached, control, state.tree, query, space)
+        moves &= bounded.admits(
+            cost, q_new, reached, control, state.tree, problems, space
+        )
 
     asked = running & moves
     free, checks = _check(
@@ -181,20 +183,20 @@ def advance(
             config.step_max,
         )
     outcome = Outcome(free, slot, q_base, q_new, reached, proposal.target, follows)
-    after = method.advance(control, outcome, query, tree, space, config)
+    after = method.advance(control, outcome, problems, tree, space, config)
     after = choose(running, after, control)
     solved = able & jnp.any(after.solved, axis=1)
     used = state.used + jnp.sum(asking, axis=1, dtype=jnp.int32)
-    chunk = state.chunk + waiting
+    bank_number = state.bank_number + waiting
     if bank is not None:  # what is left of a bank is too little for a round
-        used = jnp.maximum(used, chunk * bank.length.shape[1])
+        used = jnp.maximum(used, bank_number * bank.length.shape[1])
     return State(
-        query=query,
+        problems=problems,
         tree=tree,
         control=after,
         status=jnp.where(solved, Status.SOLVED, state.status).astype(jnp.int32),
         waiting=state.waiting | waiting,
-        chunk=chunk,
+        bank_number=bank_number,
         used=used,
         expansions=state.expansions + jnp.sum(running, axis=1, dtype=jnp.int32),
         accepted=state.accepted + jnp.sum(free, axis=1, dtype=jnp.int32),
@@ -216,7 +218,7 @@ def _base(
         return nearest(tree, side, target, space, most)
     gaps = distances(tree, side, target, space)
     anchor, least = first_min(gaps)
-    q_toggle = jnp.broadcast_to(state.query.q_toggle[:, None], target.shape)
+    q_toggle = jnp.broadcast_to(state.problems.q_toggle[:, None], target.shape)
     to_toggle = distances(tree, side, q_toggle, space)
     ties = gaps <= least[..., None] + config.toggle_tie_break
     tied, _ = first_min(jnp.where(ties, to_toggle, jnp.inf))
@@ -228,7 +230,7 @@ def _width(state: State, config: PlannerConfig) -> jax.Array:
 
     The very first expansions are the straight motions to the goals.
     """
-    goals = 1 + state.query.goals.shape[1]
+    goals = 1 + state.problems.goals.shape[1]
     grown = jnp.maximum(NARROW, state.expansions // WIDENING)
     width = jnp.where(state.expansions < goals, goals, grown)
     return jnp.minimum(width, config.workers)
@@ -248,8 +250,8 @@ def _check(
     config: PlannerConfig,
 ) -> tuple[jax.Array, jax.Array]:
     """`[P, K]` which motions are free, and `[P]` how many configurations that took."""
-    problems, workers, d = q0.shape
-    problem = jnp.repeat(jnp.arange(problems, dtype=jnp.int32), workers)
+    count, workers, d = q0.shape
+    problem = jnp.repeat(jnp.arange(count, dtype=jnp.int32), workers)
     points = jnp.ceil(length / config.edge_resolution - 1e-3)
     points = jnp.where(asked, jnp.maximum(points, 1), 0).astype(jnp.int32)
     free, checks = motions_free(
@@ -258,9 +260,9 @@ def _check(
         q0.reshape(-1, d),
         q1.reshape(-1, d),
         points.reshape(-1),
-        rows_for(problems, config),
+        rows_for(count, config),
     )
-    shape = problems, workers
+    shape = count, workers
     return free.reshape(shape), checks.reshape(shape).sum(1, dtype=jnp.int32)
 
 

@@ -10,7 +10,7 @@ from jaxplan.planning.edges import ConfigFree, all_free
 from jaxplan.planning.result import PlanResult
 from jaxplan.planning.search import rows_for
 from jaxplan.planning.space import norm
-from jaxplan.planning.state import Query
+from jaxplan.planning.state import Problem
 from jaxplan.planning.sweep import SweptFree, sweep
 
 PIECE = 1 / 16
@@ -18,7 +18,7 @@ PIECE = 1 / 16
 
 
 def check_ends_and_paths(
-    query: Query,
+    problems: Problem,
     problem: jax.Array,
     found: PlanResult,
     opening: jax.Array,
@@ -29,7 +29,7 @@ def check_ends_and_paths(
     """Checks paths, starts and goals in one pass.
 
     Args:
-        query: `[L]` questions.
+        problems: `[L]`.
         problem: `[L]` their numbers, for `checks`.
         found: `[L]` paths.
         opening: `[L]` whose start and goal are to be checked.
@@ -53,7 +53,7 @@ def check_ends_and_paths(
         0,
     )
     lane = jnp.arange(count, dtype=jnp.int32)
-    both = jnp.concatenate(query[:2])
+    both = jnp.concatenate(problems[:2])
     check = partial(all_free, config_free)
     if swept_free is not None:
         check = partial(sweep, swept_free)

@@ -1,4 +1,4 @@
-"""What a search carries: the questions, the control of each worker, and the counters."""
+"""What a search carries: the problems, the control of each worker, and the counters."""
 
 from typing import NamedTuple, TypeVar
 
@@ -13,7 +13,7 @@ from jaxplan.planning.tree import Tree
 T = TypeVar("T")
 
 
-class Query(NamedTuple):
+class Problem(NamedTuple):
     """P planning problems."""
 
     q_start: jax.Array
@@ -81,14 +81,14 @@ class Outcome(NamedTuple):
 class State(NamedTuple):
     """A search between two rounds."""
 
-    query: Query
+    problems: Problem
     tree: Tree
     control: Control
     status: jax.Array
     """`[P]` a `Status`; BUDGET_EXHAUSTED from the start on until it is solved."""
     waiting: jax.Array
     """`[P]` the next moves need learned segments that the bank does not have."""
-    chunk: jax.Array
+    bank_number: jax.Array
     """`[P]` which bank comes next, or is in use."""
     used: jax.Array
     """`[P]` learned segments used so far."""

@@ -82,13 +82,13 @@ class Bank:
         gripper_toggle: int,
         q_toggle: np.ndarray | None = None,
     ) -> "Seeing":
-        """For `Planner(sampler=...)`: start and goal are the question's, the rest is given.
+        """For `Planner(sampler=...)`: start and goal are the problem's, the rest is given.
 
         Args:
             image: `[88, 136, 3]` uint8, or the predictor's features `[F]`.
             gripper: 0 open, 1 closed.
             gripper_toggle: Its mode after the toggle.
-            q_toggle: `[d]` [rad]; each question's goal where None.
+            q_toggle: `[d]` [rad]; each problem's goal where None.
         """
         return Seeing(self, image, gripper, gripper_toggle, q_toggle)
 

@@ -1,7 +1,7 @@
 """Geoms that touch wherever the arm is, by C MuJoCo: contacts that say nothing.
 
 Collision shapes are simpler than the robot, so neighbouring ones often overlap for good:
-every question would answer START_IN_COLLISION. Which pairs may be left out for that is a
+every problem would answer START_IN_COLLISION. Which pairs may be left out for that is a
 question of safety, for what is left out is not checked:
 
     both moved by the arm, or neighbours      if they touch in every random pose
