@@ -34,7 +34,6 @@ predictor = PredictorTraining(
             scales=2,
             features=128,
             average=True,
-            keypoints=64,
         ),
         camera=HandCameraConfig(),
         calibrates=True,

@@ -220,16 +220,28 @@ def _initial(config: Training, kind: str, fresh: Params) -> Params:
     if config.init is None:
         return fresh
     weights = pretrained.load_weights(kind, config.init)
-    if weights.config != config.network:
-        raise UsageError(f"{config.init} holds a {kind} with other --network settings")
-    return _merged(fresh, jax.tree.map(jnp.asarray, weights.params))
+    try:
+        return _merged(fresh, jax.tree.map(jnp.asarray, weights.params))
+    except KeyError as error:
+        layer = "/".join(error.args[0])
+        raise UsageError(
+            f"{config.init} holds a {kind} with other --network settings: see {layer}"
+        ) from None
 
 
-def _merged(fresh: Params, known: Params) -> Params:
-    """`fresh` with the arrays of `known` in place of its own; training may need more."""
+def _merged(fresh: Params, known: Params, at: tuple[str, ...] = ()) -> Params:
+    """`fresh` with the arrays of `known` in place of its own; a network may have more.
+
+    Raises:
+        KeyError: `known` has an array that `fresh` has not, or has in another shape.
+    """
     if not isinstance(known, dict):
+        if isinstance(fresh, dict) or np.shape(fresh) != known.shape:
+            raise KeyError(at)
         return known
-    more = {name: _merged(fresh[name], value) for name, value in known.items()}
+    if not isinstance(fresh, dict) or not known.keys() <= fresh.keys():
+        raise KeyError(at)
+    more = {name: _merged(fresh[name], known[name], (*at, name)) for name in known}
     return {**fresh, **more}
 
 
