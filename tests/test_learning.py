@@ -418,7 +418,7 @@ def test_killed_process_resumes(demos, tmp_path):
         np.testing.assert_allclose(a, b, atol=1e-6)
 
 
-def test_training_starts_from_given_weights(demos, tmp_path, monkeypatch):
+def test_training_starts_from_given_weights(demos, tmp_path, monkeypatch, capsys):
     """With a learning rate of zero, what comes out is what went in."""
     monkeypatch.chdir(tmp_path)
     config = runpy.run_path(str(CONFIGS / "debug.py"))["predictor"].network
@@ -433,3 +433,40 @@ def test_training_starts_from_given_weights(demos, tmp_path, monkeypatch):
         np.testing.assert_allclose(a, b, atol=1e-6)
     other = [*still, "--network.hidden", "16", "--name", "other"]
     assert train.main([*command, *other]) == 2
+    said = capsys.readouterr().err
+    assert said.startswith("error: first holds a predictor")
+    assert "see params/" in said
+
+
+def test_a_calibrating_predictor_starts_from_one_that_does_not(
+    demos, tmp_path, monkeypatch
+):
+    """The weights that are there are taken, the camera's head is new; not the other way round."""
+    monkeypatch.chdir(tmp_path)
+    for name, calibrates in (("plain", False), ("calibrating", True)):
+        Path(f"{name}.py").write_text(
+            "import runpy\n"
+            "from dataclasses import replace\n"
+            "from jaxplan.networks import HandCameraConfig\n"
+            f"debug = runpy.run_path({str(CONFIGS / 'debug.py')!r})['predictor']\n"
+            "network = replace(debug.network, camera=HandCameraConfig())\n"
+            f"network = replace(network, calibrates={calibrates})\n"
+            f"predictor = replace(debug, network=network, name={name!r})\n"
+        )
+    command = ["--data", demos, "--steps", "1", "--optimizer.learning-rate", "0"]
+
+    def run(name: str, *options: str) -> int:
+        return train.main(["predictor", "--config", f"{name}.py", *command, *options])
+
+    assert run("plain", "--seed", "3", "--out", "first") == 0
+    assert run("calibrating", "--init", "first", "--out", "second") == 0
+    first, second = (
+        pretrained.load_weights("predictor", name) for name in ("first", "second")
+    )
+    assert second.config.calibrates
+    known = jax.tree_util.tree_leaves_with_path(first.params)
+    more = dict(jax.tree_util.tree_leaves_with_path(second.params))
+    for place, leaf in known:
+        np.testing.assert_allclose(leaf, more[place], atol=1e-6)
+    assert "camera_error" in second.params["params"]
+    assert run("plain", "--init", "second", "--name", "back") == 2
