@@ -10,7 +10,7 @@ toggles that were predicted (crosses) and the expert's (discs).
 """
 
 from collections import Counter
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -49,6 +49,22 @@ SETTINGS = {
     "distractor": Perturbation(distractor=True),
     "all together": replace(MILD, noise=0.02, light=0.7, colours=0.7, distractor=True),
 }
+AIMS = {
+    "plain": {
+        "nominal": 99,
+        "mild": 97,
+        "strong": 92,
+        "photometric": 99,
+        "mild, each query": 95,
+        "strong, each query": 90,
+        "light": 97,
+        "colours": 97,
+        "distractor": 97,
+        "all together": 93,
+    },
+    "cluttered": {"nominal": 98, "mild": 93},
+}
+"""Success that we want [%], by variant."""
 SCALE = 4
 """Of the pictures that are drawn."""
 
@@ -88,9 +104,13 @@ def main(args: Args) -> None:
         loop.perturb(SETTINGS[name])
         with tqdm(total=len(seeds), desc=name, unit="episode") as bar:
             found[name] = summary(loop.run(seeds, bar.update, memo=memo))
-    print(markdown(table(found)))
+    shown = table(found)
+    print(markdown(shown))
     result = {
         "settings": found,
+        "tables": [asdict(shown)],
+        "shortfalls": shortfalls(found, args.variant),
+        "quick": args.quick,
         "seeds": [seeds.start, seeds.stop],
         "variant": args.variant,
         "weights": [network.info.get("sha256") for network in weights],
@@ -104,7 +124,7 @@ def main(args: Args) -> None:
 
 def summary(result: dict[str, Any]) -> dict[str, Any]:
     """Of one setting."""
-    error = result["toggle_error"]
+    error = result["toggle_error"] or {}
     kinds = Counter(e["kind"] for e in result["episodes"] if not e["success"])
     return {
         "success_rate": result["success_rate"],
@@ -131,6 +151,21 @@ def table(found: dict[str, dict[str, Any]]) -> Table:
     columns = ["setting", "success %", "paper %", "to the nearest toggle [rad]"]
     columns += ["to the next [rad]", "paper, nearest [rad]", "failures"]
     return Table("Robustness", columns, rows)
+
+
+def shortfalls(found: dict[str, dict[str, Any]], variant: str) -> list[str]:
+    """Where success, or the error to the nearest toggle, is not what we want."""
+    lines = []
+    for name, one in found.items():
+        rate, aim = 100 * one["success_rate"], AIMS.get(variant, {}).get(name)
+        if aim is not None and rate < aim:
+            lines.append(f"{variant}, {name}: success {rate:.1f} % (aim {aim})")
+        error, aim = one["toggle_error_nearest"], ERRORS.get(name)
+        if error is not None and aim is not None and error > aim:
+            lines.append(
+                f"{variant}, {name}: {error:.4f} rad to the nearest toggle (aim {aim})"
+            )
+    return lines
 
 
 def draw(loop: ClosedLoop, settings: tuple[str, ...], seed: int) -> Image.Image:

@@ -8,7 +8,8 @@ import pytest
 
 sys.path.append(str(Path(__file__).parents[1] / "eval"))
 
-from robustness import PAPER, SETTINGS, summary, table
+from parts.summary import robustness
+from robustness import AIMS, PAPER, SETTINGS, shortfalls, summary, table
 
 from jaxplan.evaluation.tables import markdown
 
@@ -39,8 +40,34 @@ def test_failures_are_counted_by_kind():
     assert f"| {PAPER['mild']} " in text
 
 
+def test_what_falls_short_is_named():
+    found = summary(result([None] * 24 + ["dropped"]))
+    assert shortfalls({"mild": found}, "plain") == [
+        "plain, mild: success 96.0 % (aim 97)"
+    ]
+    assert shortfalls({"nominal": found}, "cluttered") == [
+        "cluttered, nominal: success 96.0 % (aim 98)",
+        "cluttered, nominal: 0.0200 rad to the nearest toggle (aim 0.0112)",
+    ]
+    assert shortfalls({"strong": found}, "plain") == []
+
+
+def test_files_stand_side_by_side_in_the_summary():
+    found = summary(result([None, "dropped"]))
+    files = {
+        "robustness_plain": {"settings": {"nominal": found, "mild": found}},
+        "robustness_without_variation": {"settings": {"mild": found}},
+    }
+    shown = robustness(files)
+    assert shown.columns[1::2] == ["plain, %", "without variation, %"]
+    assert [row[0] for row in shown.rows] == ["nominal", "mild"]
+    assert shown.rows[0][3:] == [None, None]
+    assert shown.rows[1][3].value == 50
+
+
 def test_the_paper_s_settings_are_there():
     assert {*PAPER} <= {*SETTINGS}
+    assert all({*aims} <= {*SETTINGS} for aims in AIMS.values())
     assert SETTINGS["nominal"].nothing
     assert not any(SETTINGS[name].nothing for name in SETTINGS if name != "nominal")
     assert SETTINGS["mild, each query"].each_query

@@ -33,6 +33,24 @@ def success(found: Found) -> Table:
     return Table(ours.title, ours.columns, [*ours.rows, paper])
 
 
+def robustness(found: Found) -> Table:
+    """A row a setting: success and error to the nearest toggle, of each file."""
+    columns, rows = [""], {}
+    for name, result in found.items():
+        of = name.partition("_")[2].replace("_", " ")
+        columns += [f"{of}, %", f"{of}, nearest toggle [rad]"]
+        for setting, one in result["settings"].items():
+            rows.setdefault(setting, {})[name] = (
+                rate(one),
+                one["toggle_error_nearest"],
+            )
+    body = [
+        [setting, *(cell for name in found for cell in by.get(name, (None, None)))]
+        for setting, by in rows.items()
+    ]
+    return Table("", columns, body)
+
+
 def recovery(found: Found) -> Table:
     """A row a file: how many episodes succeed, and how well toggles are predicted."""
     rows: list[list[Any]] = []
