@@ -14,6 +14,7 @@ from jaxplan.evaluation import ClosedLoop, ClosedLoopConfig
 from jaxplan.learning import Weights
 from jaxplan.pictures.film import Film
 from jaxplan.planning import Status
+from jaxplan.provenance import versions
 from jaxplan.simulation.camera import require_gl
 
 
@@ -59,7 +60,7 @@ def solve(
         f"{episode['expansions']} expansions, {episode['planning_seconds']:.2f} s of search"
     )
     if film is not None and directory is not None:
-        episode |= {"weights": result["weights"], "versions": result["versions"]}
+        episode |= {"weights": result["weights"], "versions": versions()}
         (directory / "episode.json").write_text(json.dumps(episode, indent=1) + "\n")
         film.write(directory)
         print(f"written: {directory / 'episode.json'}, episode.mp4, phases.png")

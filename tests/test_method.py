@@ -30,6 +30,22 @@ def test_the_mug_ends_in_the_box(nominal):
         assert episode["success"] == (episode["failure"] is None)
 
 
+@pytest.mark.slow
+def test_an_episode_is_the_same_whoever_runs_beside_it(nominal):
+    """Three of them in a loop of two lanes: statuses, expansions, toggles, joints."""
+    beside = ClosedLoop(load_pair(), ClosedLoopConfig(batch=2)).run(SEEDS[5:8])
+
+    def lasting(episode):
+        return {
+            k: v for k, v in episode.items() if "seconds" not in k and k != "phases"
+        }
+
+    for ours, theirs in zip(nominal["episodes"][5:8], beside["episodes"], strict=True):
+        assert lasting(ours) == lasting(theirs)
+        for one, other in zip(ours["phases"], theirs["phases"], strict=True):
+            assert lasting(one) == lasting(other)
+
+
 def test_a_killed_study_goes_on(loop, nominal, tmp_path, monkeypatch):
     """Finished batches are read, not run again, and say what an unbroken run says."""
     loop.run(SEEDS, memo=Memo(tmp_path))

@@ -215,12 +215,29 @@ def test_banks_are_what_the_agent_draws():
     banks = KeptBanks(bank, cond, problems.keys())
     banks.of(np.array([1, 2]))(np.array([0, 0]))
     found = banks.of(np.array([2, 0, 1]))(np.array([1, 0, 2]))
-    for name in ("direction", "length"):
-        np.testing.assert_allclose(
-            getattr(found, name),
-            getattr(expected, name)[np.array([2, 0, 1])],
-            atol=1e-4,
-        )
+    for ours, theirs in zip(found, expected, strict=True):
+        np.testing.assert_array_equal(ours, theirs[np.array([2, 0, 1])])
+
+
+def test_networks_say_the_same_to_the_last_bit_whoever_is_beside():
+    """Alone, and in batches of other sizes: subgoals, features and segments."""
+    predictor, sampler = load_pair()
+    problems = some_problems((3, 5, 8, 9, 11))
+    upper = Upper(predictor, "hand")
+    propose = LearnedProposals(Bank(sampler), upper, "hand")
+
+    def said(rows: np.ndarray) -> list[np.ndarray]:
+        some = problems.take(rows)
+        seen = Observation({"hand": some.image}, some.q, some.gripper)
+        subgoal, features = upper(seen, [])
+        draw = propose(seen, features, subgoal, some.keys())
+        leaves = subgoal, features, draw(np.zeros(len(rows), np.int32))
+        return [np.asarray(leaf) for leaf in jax.tree.leaves(leaves)]
+
+    whole = said(np.arange(5))
+    for rows in ([2], [4, 0], [1, 2, 3]):
+        for leaf, alone in zip(whole, said(np.array(rows)), strict=True):
+            np.testing.assert_array_equal(leaf[rows], alone)
 
 
 @pytest.mark.parametrize("backbone", BACKBONES, ids=lambda backbone: backbone.name)
