@@ -27,6 +27,7 @@ from jaxplan.cli import run_script
 from jaxplan.evaluation import versions
 from jaxplan.evaluation.motion_bench import data_directory
 from jaxplan.evaluation.result import write_result
+from jaxplan.ranges import Checked
 
 Name = Literal["collision", "planning", "proposals", "compile"]
 PARTS = {
@@ -39,7 +40,7 @@ BASELINE = Path(__file__).parent / "results" / "benchmark.json"
 
 
 @dataclass(frozen=True)
-class Args:
+class Args(Checked):
     """Measures speed against MuJoCo, OMPL, PyBullet and PyTorch."""
 
     parts: tuple[Name, ...] = ("collision", "planning", "proposals", "compile")

@@ -31,6 +31,7 @@ from jaxplan.evaluation.motion_bench import (
 )
 from jaxplan.evaluation.result import write_result
 from jaxplan.motion import Planner
+from jaxplan.ranges import Checked, Count, NotNegative, Positive, Whole
 from jaxplan.scene import Scene
 
 ROUNDING = 1e-6
@@ -38,20 +39,20 @@ ROUNDING = 1e-6
 
 
 @dataclass(frozen=True)
-class Args:
+class Args(Checked):
     """Proves paths and looks for what the proofs overlooked."""
 
     out: Path = Path("runs/certificates.json")
     data: Path = field(default_factory=data_directory)
     """Directory with the Panda's spheres and the problems."""
-    paths: int = 500
-    first: int = 0
+    paths: Count = 500
+    first: Whole = 0
     """How many paths to pass over, so that a long run can be made in parts."""
-    margin: float = 0.002
+    margin: NotNegative = 0.002
     """Of the planner [m]."""
-    tolerance: float = 0.001
+    tolerance: NotNegative = 0.001
     """Of the certificates [m]."""
-    fine: float = 1e-4
+    fine: Positive = 1e-4
     """Motion between samples that look for what a proof overlooked [m]."""
 
 

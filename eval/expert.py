@@ -19,15 +19,16 @@ from jaxplan.episodes import run_episodes
 from jaxplan.evaluation import parse_seeds, wilson
 from jaxplan.evaluation.certification import Certification
 from jaxplan.evaluation.result import write_result
+from jaxplan.ranges import Checked, Count
 
 
 @dataclass(frozen=True)
-class Args:
+class Args(Checked):
     """Runs the scripted expert without noise."""
 
     seeds: str = "0:200"
     out: Path = Path("runs/expert.json")
-    batch: int = 32
+    batch: Count = 32
     task: str = tasks.DEFAULT
     variant: str = "plain"
 

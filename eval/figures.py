@@ -28,6 +28,7 @@ from jaxplan.learned import LearnedProposals
 from jaxplan.pictures import painter
 from jaxplan.pictures.painter import Moment, Painter
 from jaxplan.pretrained import WeightsError, load_pair, load_weights, shipped
+from jaxplan.ranges import Checked
 from jaxplan.samplers import Bank
 
 SAMPLERS = {"Diffusion (ours)": "sampler", "CVAE": "cvae", "Conditional GAN": "gan"}
@@ -37,7 +38,7 @@ NEAR = 0.02
 
 
 @dataclass(frozen=True)
-class Args:
+class Args(Checked):
     """Runs some episodes and draws them."""
 
     seeds: str = "100000:100008"

@@ -20,20 +20,21 @@ from jaxplan.cli import run_script
 from jaxplan.evaluation.fuzzing import Judged, interrogate, worlds_of
 from jaxplan.evaluation.random_scenes import random_scene
 from jaxplan.evaluation.result import write_result
+from jaxplan.ranges import Checked, Count, Whole
 
 
 @dataclass(frozen=True)
-class Args:
+class Args(Checked):
     """Asks whole problems in random scenes, and has C MuJoCo judge the answers."""
 
     out: Path = Path("runs/fuzz.jsonl")
     """A scene a line; beside it, with the suffix .json, the summary."""
-    scenes: int = 300
-    seed: int = 0
+    scenes: Count = 300
+    seed: Whole = 0
     """Of the first."""
-    stride: int = 1
+    stride: Count = 1
     """From one scene's seed to the next: so that processes can share the work."""
-    worlds: int = 1
+    worlds: Whole = 1
     """Random ones in each scene, besides the model's own."""
 
 

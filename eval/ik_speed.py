@@ -29,6 +29,7 @@ from jaxplan.cli import run_script
 from jaxplan.evaluation.motion_bench import data_directory
 from jaxplan.evaluation.result import write_result
 from jaxplan.ik import BATCH_ROUNDS, inverse_kinematics, inverse_kinematics_batch
+from jaxplan.ranges import Checked, Count
 
 PART = "inverse kinematics"
 OURS, ONE, MINK = "jaxplan, one call", "jaxplan, one pose a call", "mink"
@@ -49,13 +50,13 @@ UR5E = (
 
 
 @dataclass(frozen=True)
-class Args:
+class Args(Checked):
     """Asks each arm for the same number of poses."""
 
     out: Path = Path("runs/ik_speed.json")
     data: Path = field(default_factory=data_directory)
     """Directory with the trees of Panda and Fetch."""
-    poses: int = 1000
+    poses: Count = 1000
     quick: bool = False
     """100 poses an arm."""
 

@@ -21,12 +21,13 @@ from peers import peer_versions
 from jaxplan.cli import run_script
 from jaxplan.evaluation.motion_bench import data_directory, read_problems, read_robot
 from jaxplan.evaluation.result import write_result
+from jaxplan.ranges import Checked, Positive
 
 PART = "MotionBenchMaker"
 
 
 @dataclass(frozen=True)
-class Args:
+class Args(Checked):
     """Solves each problem of each set once, with warm programs."""
 
     out: Path = Path("runs/motion_bench.json")
@@ -37,7 +38,7 @@ class Args:
     """5 problems a set."""
     sets: tuple[str, ...] = ()
     """All by default."""
-    give_up: float = 10.0
+    give_up: Positive = 10.0
     """When OMPL does [s]; a problem that it has not solved by then counts as that long."""
 
 

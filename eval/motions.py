@@ -21,6 +21,7 @@ from jaxplan.cli import run_script
 from jaxplan.collision import clearance_mujoco
 from jaxplan.collision.touching import random_poses
 from jaxplan.evaluation.result import write_result
+from jaxplan.ranges import Checked, Count, NotNegative, Positive
 
 ARM = """
 <mujoco>
@@ -61,15 +62,15 @@ BATCH = 64
 
 
 @dataclass(frozen=True)
-class Args:
+class Args(Checked):
     """Plans and times motions in each scene, and has C MuJoCo check them."""
 
     out: Path = Path("runs/motions.json")
-    problems: int = 350
+    problems: Count = 350
     """A scene."""
-    resolution: float = 0.002
+    resolution: Positive = 0.002
     """Of the certificates [rad]."""
-    tolerance: float = 0.001
+    tolerance: NotNegative = 0.001
     """Penetration that still passes [m]."""
     quick: bool = False
     """20 problems a scene."""

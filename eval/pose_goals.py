@@ -20,10 +20,11 @@ from jaxplan.cli import run_script
 from jaxplan.evaluation import wilson
 from jaxplan.evaluation.motion_bench import data_directory, read_problems, read_robot
 from jaxplan.evaluation.result import write_result
+from jaxplan.ranges import Checked
 
 
 @dataclass(frozen=True)
-class Args:
+class Args(Checked):
     """Plans to each problem's pose once."""
 
     out: Path = Path("runs/pose_goals.json")

@@ -40,6 +40,7 @@ from jaxplan.pretrained import (
     WeightsError,
     load_weights,
 )
+from jaxplan.ranges import Checked, Count
 from jaxplan.samplers import draw, init
 from jaxplan.samplers.bank import SIZE
 
@@ -59,10 +60,10 @@ EPISODES = 32
 
 
 @dataclass(frozen=True)
-class Args:
+class Args(Checked):
     """Measures how long each sampler takes for a proposal."""
 
-    proposals: int = 500
+    proposals: Count = 500
     """Of each sampler, one at a time; a tenth as many calls for a phase's bank."""
     quick: bool = False
     """50 proposals."""

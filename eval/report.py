@@ -18,6 +18,7 @@ from parts.summary import PAPER_ERROR, PAPER_NOMINAL, PAPER_SUCCESS, Found, rate
 from jaxplan.cli import run_script
 from jaxplan.data import write_atomic
 from jaxplan.evaluation.tables import Table, markdown, table
+from jaxplan.ranges import Checked
 
 ROOT = Path(__file__).parents[1]
 RESULTS = Path(__file__).parent / "results"
@@ -138,7 +139,7 @@ FIGURES = {
 
 
 @dataclass(frozen=True)
-class Args:
+class Args(Checked):
     """Writes RESULTS.md and the pages that it leads to."""
 
     results: Path = RESULTS

@@ -30,6 +30,7 @@ from jaxplan.collision.touching import random_poses
 from jaxplan.config import PlannerConfig
 from jaxplan.evaluation.result import write_result
 from jaxplan.motion import Planner
+from jaxplan.ranges import Checked, Count, Whole
 from jaxplan.scene import geom_pairs
 
 BAND = 1e-4
@@ -39,7 +40,7 @@ REACH = 0.05
 
 
 @dataclass(frozen=True)
-class Args:
+class Args(Checked):
     """Loads each robot, compares distances with C MuJoCo's, plans and certifies."""
 
     root: Path | None = None
@@ -47,11 +48,11 @@ class Args:
     out: Path = Path("runs/robots.json")
     only: tuple[str, ...] = ()
     """Names of robots; all by default."""
-    configurations: int = 1000
-    problems: int = 10
-    refused: int = 2
+    configurations: Count = 1000
+    problems: Count = 10
+    refused: Whole = 2
     """Of the problems: goals in collision."""
-    obstacles: int = 6
+    obstacles: Whole = 6
     """Around arms that come alone."""
     planner: PlannerConfig = PlannerConfig(method="rrt_connect", max_expansions=2000)
 

@@ -27,6 +27,7 @@ from jaxplan.evaluation.result import write_result
 from jaxplan.evaluation.tables import Estimate, Table, markdown
 from jaxplan.pictures.painter import CLOSES, SUBGOAL, Mark, marked
 from jaxplan.pretrained import load_pair, shipped
+from jaxplan.ranges import Checked, Count
 from jaxplan.tasks.perturbation import NOMINAL, Perturbation
 
 MILD = Perturbation(yaw=5, pitch=5, translation=0.01)
@@ -70,7 +71,7 @@ SCALE = 4
 
 
 @dataclass(frozen=True)
-class Args:
+class Args(Checked):
     """Runs the same episodes under each setting."""
 
     seeds: str = "200000:200300"
@@ -80,7 +81,7 @@ class Args:
     """Of the task's scene."""
     weights: Path | None = None
     """Directory with predictor, sampler and manifest; by default the shipped ones."""
-    batch: int = 32
+    batch: Count = 32
     quick: bool = False
     """8 episodes."""
     picture: Path | None = None

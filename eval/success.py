@@ -14,10 +14,11 @@ from jaxplan.evaluation import ClosedLoopConfig, evaluate, parse_seeds
 from jaxplan.evaluation.memo import Memo
 from jaxplan.evaluation.result import write_result
 from jaxplan.pretrained import load_pair, shipped
+from jaxplan.ranges import Checked
 
 
 @dataclass(frozen=True)
-class Args:
+class Args(Checked):
     """Runs the whole method on each seed and says how often it succeeds."""
 
     seeds: str = "100000:100100"

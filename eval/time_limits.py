@@ -24,6 +24,7 @@ from jaxplan.evaluation.motion_bench import (
     table,
 )
 from jaxplan.evaluation.result import write_result
+from jaxplan.ranges import Checked, Count, Positive
 
 WALL = (
     Obstacle("box", [1.0, 0.005, 1.5], [1.15, 0.0, 0.5, 1, 0, 0, 0]),
@@ -35,14 +36,14 @@ ASIDE = 0.6
 
 
 @dataclass(frozen=True)
-class Args:
+class Args(Checked):
     """Asks with a time limit and measures how long each answer took."""
 
     out: Path = Path("runs/time_limits.json")
     data: Path = field(default_factory=data_directory)
     """Directory with the Panda's spheres."""
-    problems: int = 200
-    time_limit: float = 0.1
+    problems: Count = 200
+    time_limit: Positive = 0.1
     """[s]."""
 
 

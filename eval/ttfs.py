@@ -26,6 +26,7 @@ from jaxplan.evaluation.result import Result
 from jaxplan.evaluation.statistics import ratio_of_means
 from jaxplan.evaluation.tables import Estimate, Table
 from jaxplan.provenance import versions
+from jaxplan.ranges import Count
 from jaxplan.samplers.bank import SIZE
 
 BASE, CVAE, FEW = "ours (diffusion, DDIM-25)", "CVAE", "few-step"
@@ -49,7 +50,7 @@ class Args(StudyArgs):
     p_uniform: tuple[float, ...] = (0.2, 0.6)
     method: str = "rrt_connect"
     """Or `rrt`, in which every phase asks the sampler."""
-    bank: int = SIZE
+    bank: Count = SIZE
     """Segments that a sampler draws at a time."""
 
 

@@ -1,6 +1,7 @@
 """The command `jaxplan`."""
 
 import difflib
+import errno
 import io
 import os
 import sys
@@ -13,6 +14,9 @@ import tyro
 from tyro.conf import Positional
 
 from jaxplan.interrupt import CLOSED, INTERRUPTED, end_on_interrupt
+
+BAD_INPUT, FULL = 2, 1
+"""Exit codes; the second one of a full disk."""
 
 
 @dataclass(frozen=True)
@@ -113,7 +117,11 @@ def run_script(main: Callable[[Any], None], arguments: type) -> NoReturn:
     _be_a_program()
 
     def run() -> int:
-        main(tyro.cli(arguments))
+        given = tyro.cli(arguments)
+        if out := getattr(given, "out", None):
+            usual = arguments.__dataclass_fields__["out"].default
+            _check_out(out, directory=isinstance(usual, Path) and not usual.suffix)
+        main(given)
         return 0
 
     sys.exit(_guarded(run))
@@ -138,11 +146,13 @@ def _guarded(run: Callable[[], int]) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return CLOSED
     except (ValueError, RuntimeError, OSError) as error:
-        return _fail((str(error) or type(error).__name__).splitlines()[0])
+        _fail((str(error) or type(error).__name__).splitlines()[0])
+        return FULL if getattr(error, "errno", None) == errno.ENOSPC else BAD_INPUT
 
 
 def _plan(command: PlanCommand) -> int:
     _check_seed(command.seed)
+    _check_out(command.out)
     _keep_compiled()
     from jaxplan.commands.plan import plan
 
@@ -159,6 +169,7 @@ def _check(command: CheckCommand) -> int:
 
 def _solve(command: SolveCommand) -> int:
     _check_seed(command.seed)
+    _check_out(command.out)
     _keep_compiled()
     from jaxplan import tasks
     from jaxplan.evaluation import ClosedLoopConfig
@@ -181,6 +192,13 @@ def _check_seed(seed: int) -> None:
         raise ValueError(f"seed {seed}: expected 0 to {2**31 - 1}")
 
 
+def _check_out(out: Path | None, directory: bool = True) -> None:
+    if out is not None:
+        from jaxplan.data import check_writable
+
+        check_writable(out, directory, "--out")
+
+
 def _keep_compiled() -> None:
     """Keeps compiled programs for the next run, where the user has not said otherwise."""
     import jax
@@ -196,7 +214,7 @@ def _keep_compiled() -> None:
 
 def _fail(message: str) -> int:
     print(f"error: {message}", file=sys.stderr)
-    return 2
+    return BAD_INPUT
 
 
 if __name__ == "__main__":

@@ -9,6 +9,7 @@ the run's newest checkpoint. `--help` lists every setting.
 import argparse
 import dataclasses
 import difflib
+import errno
 import hashlib
 import logging
 import runpy
@@ -23,11 +24,12 @@ import numpy as np
 import tyro
 
 from jaxplan import data, learning, pretrained
+from jaxplan.cli import BAD_INPUT, FULL
 from jaxplan.learning import predictor, sampler, segments
 from jaxplan.learning.loop import TrainConfig
 from jaxplan.learning.predictor import PredictorTraining
 from jaxplan.learning.sampler import SegmentTraining
-from jaxplan.learning.train_state import Loss, Params
+from jaxplan.learning.train_state import Params
 from jaxplan.pretrained import UPPER
 from jaxplan.samplers import FAMILIES, Family, init
 
@@ -53,6 +55,7 @@ def main(arguments: list[str] | None = None) -> int:
     logging.getLogger("absl").setLevel(logging.WARNING)
     try:
         config = parse(sys.argv[1:] if arguments is None else arguments)
+        _check_writable(config)
         if isinstance(config, PredictorTraining):
             path = train_predictor(config)
         else:
@@ -63,6 +66,9 @@ def main(arguments: list[str] | None = None) -> int:
     except learning.TrainingDiverged as error:
         print(f"error: {error}", file=sys.stderr)
         return 1
+    except OSError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return FULL if error.errno == errno.ENOSPC else BAD_INPUT
     except ValueError as error:
         known = (
             UsageError,
@@ -74,7 +80,7 @@ def main(arguments: list[str] | None = None) -> int:
         if not isinstance(error, known):
             raise
         print(f"error: {error}", file=sys.stderr)
-        return 2
+        return BAD_INPUT
 
 
 def parse(arguments: list[str]) -> Training:
@@ -92,6 +98,7 @@ def parse(arguments: list[str]) -> Training:
     config, unknown = tyro.cli(
         known[chosen.kind],
         prog=f"python -m jaxplan.train {chosen.kind} [--config FILE]",
+        description="FILE is a Python program, which is run: take only what you trust.",
         default=default,
         args=rest,
         return_unknown_args=True,
@@ -104,6 +111,16 @@ def parse(arguments: list[str]) -> Training:
         hint = f"; did you mean {near[0]}?" if near else "; see --help"
         raise UsageError(f"unknown setting {unknown[0]}{hint}")
     return config
+
+
+def _check_writable(config: Training) -> None:
+    """Before hours of work."""
+    try:
+        data.check_writable(RUNS, True, "the directory of runs,")
+        if config.out is not None:
+            data.check_writable(config.out, True, "--out")
+    except ValueError as error:
+        raise UsageError(str(error)) from None
 
 
 def train_predictor(config: PredictorTraining) -> Path:
@@ -121,6 +138,7 @@ def train_predictor(config: PredictorTraining) -> Path:
         rows,
         gather,
         predictor.validation(config.network, shard, val_rows),
+        origin,
     )
     return _export(config, UPPER, state.ema_params, metrics, origin)
 
@@ -130,9 +148,14 @@ def train_sampler(family: Family, config: SegmentTraining) -> Path:
     upper = None
     if config.network.encoder is None:
         upper = pretrained.load_weights(UPPER, config.predictor)
-    loss = _sampler_loss(family, config, upper)
+    teacher = _teacher(family, config, upper)
+    taught = partial(family.loss, config)
+    loss = taught if teacher is None else partial(taught, teacher)
     shard, origin = _read(config)
     image = shard.image if upper is None else _features(upper, shard, origin["data"])
+    for name, weights in (("predictor", upper), ("teacher", teacher)):
+        if weights is not None:
+            origin[f"{name}_sha256"] = weights.info["sha256"]
     held = learning.held_out(shard.seed, config.val_fraction)
     rows, val_rows = _split(segments.eligible(shard, config.network.step_min), held)
     fresh = jax.jit(init, static_argnums=(0, 2))(
@@ -146,20 +169,21 @@ def train_sampler(family: Family, config: SegmentTraining) -> Path:
         rows,
         partial(sampler.gather, shard, image),
         sampler.validation(config, family.draw, loss, shard, image, val_rows),
+        origin,
     )
-    if upper is not None:
-        origin["predictor_sha256"] = upper.info["sha256"]
     return _export(config, family.name, state.ema_params, metrics, origin)
 
 
-def _sampler_loss(family: Family, config: Any, upper: learning.Weights | None) -> Loss:
-    """The family's loss, with its teacher in it if it has one.
+def _teacher(
+    family: Family, config: Any, upper: learning.Weights | None
+) -> learning.Weights | None:
+    """Whose pupil a family is, if it is one.
 
     Raises:
         UsageError: The teacher sees other conditions than the pupil, or says other things.
     """
     if family.teacher is None:
-        return partial(family.loss, config)
+        return None
     teacher = pretrained.load_weights(family.teacher, config.teacher)
     if teacher.config.size != config.network.size:
         raise UsageError(
@@ -172,7 +196,7 @@ def _sampler_loss(family: Family, config: Any, upper: learning.Weights | None) -
             f"the {family.teacher} in {config.teacher} was trained on another "
             "predictor's features"
         )
-    return partial(family.loss, config, teacher)
+    return teacher
 
 
 def _read(config: TrainConfig) -> tuple[data.Shard, dict[str, Any]]:
@@ -180,8 +204,14 @@ def _read(config: TrainConfig) -> tuple[data.Shard, dict[str, Any]]:
     shards = [data.read_demonstrations(directory) for directory in config.data]
     shard = shards[0] if len(shards) == 1 else data.concatenate(shards)
     logger.info("%d frames of %d episodes", len(shard.q), len(shard.episode_seed))
-    # By name: where a machine keeps its data says nothing to anybody else.
-    hashes = {Path(d).name: data.sha256(Path(d) / "manifest.json") for d in config.data}
+    hashes: dict[str, str] = {}
+    for directory in map(Path, config.data):
+        # By name: where a machine keeps its data says nothing to anybody else.
+        name, number = directory.name, 1
+        while name in hashes:
+            number += 1
+            name = f"{directory.name} ({number})"
+        hashes[name] = data.sha256(directory / "manifest.json")
     settings = [data.read_manifest(d)["settings"] for d in config.data]
     shown = {
         f"{kind}s": sorted({each[kind] for each in settings if kind in each})
@@ -271,8 +301,9 @@ def _read_config(path: str, kind: str) -> Training:
         raise UsageError(f"no such config: {path}{hint}")
     try:
         config: Any = runpy.run_path(path).get(kind)
-    except (TypeError, ValueError) as error:  # no such setting, or no such value
-        raise UsageError(f"{path}: {error}") from None
+    except Exception as error:  # a config is a program, and may fail in any way
+        said = (str(error) or "no reason given").splitlines()[0]
+        raise UsageError(f"{path}: {type(error).__name__}: {said}") from None
     if not isinstance(config, kinds()[kind]):
         raise UsageError(f"{path} defines no `{kind} = {kinds()[kind].__name__}(...)`")
     return config

@@ -13,6 +13,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from toy_demonstrations import demonstrations
+from toy_training import TOY, toy
 
 from jaxplan import data, learning, pretrained, train
 from jaxplan.base import Subgoal
@@ -165,39 +166,6 @@ def test_held_out_episodes_do_not_depend_on_how_many_there_are():
     assert held_many & set(few) <= held_few
 
 
-def toy(config, run, poison: int | None = None, stop: int | None = None):
-    """Fits a line; `stop` kills the run after so many batches."""
-    seen = []
-
-    def gather(rows):
-        if stop is not None and len(seen) == stop:
-            raise KeyboardInterrupt
-        seen.append(rows)
-        bad = poison is not None and len(seen) > poison
-        return jnp.asarray(rows * (np.nan if bad else 0.01), jnp.float32)
-
-    def loss(params, key, batch):
-        noisy = batch + 0.01 * jax.random.normal(key, batch.shape)
-        return jnp.mean((params["w"] * noisy - 2.0 * batch) ** 2), {}
-
-    def validate(params):
-        return {"w": float(params["w"])}
-
-    params = {"w": jnp.zeros(())}
-    return learning.fit(config, run, params, loss, np.arange(64), gather, validate)
-
-
-TOY = PredictorTraining(
-    name="toy",
-    steps=30,
-    batch_size=8,
-    log_every=5,
-    validate_every=15,
-    checkpoint_every=10,
-    optimizer=OptimizerConfig(learning_rate=0.1, warmup_steps=2),
-)
-
-
 def test_kill_and_resume_equals_uninterrupted(tmp_path):
     whole, _ = toy(TOY, tmp_path / "whole")
     with pytest.raises(KeyboardInterrupt):
@@ -228,7 +196,7 @@ def test_non_finite_loss_keeps_the_last_good_checkpoint(tmp_path):
 
 PARALLEL = """
 import jax, numpy as np, sys
-import test_learning as t
+import toy_training as t
 from pathlib import Path
 assert len(jax.devices()) == 2
 state, _ = t.toy(t.TOY, Path(sys.argv[1]))
@@ -434,7 +402,7 @@ def test_training_starts_from_given_weights(demos, tmp_path, monkeypatch, capsys
     other = [*still, "--network.hidden", "16", "--name", "other"]
     assert train.main([*command, *other]) == 2
     said = capsys.readouterr().err
-    assert said.startswith("error: first holds a predictor")
+    assert "error: first holds a predictor" in said
     assert "see params/" in said
 
 

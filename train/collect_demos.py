@@ -19,22 +19,23 @@ from jaxplan import data, tasks
 from jaxplan.cli import run_script
 from jaxplan.demonstrations import DemonstrationConfig, ExpertAgent, Recorder
 from jaxplan.episodes import run_episodes
+from jaxplan.ranges import Checked, Count, Whole
 from jaxplan.tasks.perturbation import NOMINAL, Perturbation
 
 
 @dataclass(frozen=True)
-class Args:
+class Args(Checked):
     """What to collect."""
 
     out: Path = Path("data/mug")
-    episodes: int = 2000
-    first_seed: int = 0
-    shard_size: int = 32
+    episodes: Count = 2000
+    first_seed: Whole = 0
+    shard_size: Count = 32
     """Episodes a shard; one batch in lockstep."""
     camera: str = "hand"
     task: str = tasks.DEFAULT
     variant: str = "plain"
-    workers: int = field(default_factory=lambda: os.cpu_count() or 1)
+    workers: Count = field(default_factory=lambda: os.cpu_count() or 1)
     """Processes, each making one shard at a time. The bytes do not depend on it."""
     perturbation: Perturbation = NOMINAL
     """What varies in the pictures."""
@@ -81,9 +82,6 @@ def _shard(index: int) -> tuple[int, int]:
 
 def main(args: Args) -> None:
     """Collects what is missing."""
-    for name in ("episodes", "shard_size", "workers"):
-        if getattr(args, name) < 1:
-            raise ValueError(f"{name} {getattr(args, name)}: expected at least 1")
     count = -(-args.episodes // args.shard_size)
     if not 0 <= args.first_seed <= 2**31 - count * args.shard_size:
         raise ValueError(f"first_seed {args.first_seed}: seeds are 0 to {2**31 - 1}")

@@ -18,18 +18,19 @@ from jaxplan.episodes import run_episodes
 from jaxplan.learned import learned
 from jaxplan.motion import MotionPlanner
 from jaxplan.pretrained import load_pair, shipped
+from jaxplan.ranges import Checked, Count, Whole
 
 
 @dataclass(frozen=True)
-class Args:
+class Args(Checked):
     """What to collect."""
 
     out: Path = Path("data/mug_relabelled")
     weights: Path | None = None
     """Directory with the networks that drive; those that are shipped for the variant where None."""
-    episodes: int = 256
-    first_seed: int = 50_000
-    shard_size: int = 32
+    episodes: Count = 256
+    first_seed: Whole = 50_000
+    shard_size: Count = 32
     camera: str = "hand"
     task: str = tasks.DEFAULT
     variant: str = "plain"
@@ -37,10 +38,6 @@ class Args:
 
 def main(args: Args) -> None:
     """Collects what is missing."""
-    if args.episodes < 1 or args.shard_size < 1:
-        raise ValueError(
-            f"nothing to do: {args.episodes} episodes, {args.shard_size} a shard"
-        )
     name, robot = tasks.check(args.task, args.variant), tasks.TASKS[args.task].robot
     weights = load_pair(args.weights or shipped(args.variant))
     for network in weights:

@@ -3,6 +3,7 @@
 import hashlib
 import io
 import os
+import tempfile
 import zipfile
 from collections.abc import Mapping
 from pathlib import Path
@@ -26,6 +27,31 @@ def write_atomic(path: str | os.PathLike, content: bytes) -> None:
         file.flush()
         os.fsync(file.fileno())
     os.replace(beside, path)
+
+
+def check_writable(path: str | os.PathLike, directory: bool, name: str) -> None:
+    """Finds out before hours of work whether something can be written.
+
+    Args:
+        path: Of a directory, or of a file; it need not be there yet.
+        directory: Which of them.
+        name: Of the setting, for the message.
+
+    Raises:
+        ValueError: It cannot.
+    """
+    path = Path(path)
+    if path.is_dir() and not directory:
+        raise ValueError(f"{name} {path}: is a directory")
+    place = path if directory else path.parent
+    while not place.exists():
+        place = place.parent
+    if not place.is_dir():
+        raise ValueError(f"{name} {path}: {place} is a file")
+    try:
+        tempfile.TemporaryFile(dir=place).close()
+    except OSError as error:
+        raise ValueError(f"{name} {path}: {place}: {error.strerror}") from None
 
 
 def write_npz(path: str | os.PathLike, arrays: Mapping[str, np.ndarray]) -> None:

@@ -24,12 +24,13 @@ from jaxplan.evaluation.toggle_error import ToggleError, ToggleErrors, summarize
 from jaxplan.learned import learned
 from jaxplan.learning import Weights
 from jaxplan.motion import MotionPlanner
+from jaxplan.ranges import Checked, Count, NotNegative
 from jaxplan.simulation.physics import CONTROL_PERIOD
 from jaxplan.tasks.perturbation import NOMINAL, Perturbation
 
 
 @dataclasses.dataclass(frozen=True)
-class ClosedLoopConfig:
+class ClosedLoopConfig(Checked):
     """What runs, and how."""
 
     planner: PlannerConfig = PAPER_PLANNER
@@ -40,15 +41,15 @@ class ClosedLoopConfig:
     variant: str = "plain"
     """Of the task's scene."""
     camera: str = "hand"
-    batch: int = 32
+    batch: Count = 32
     """Episodes in lockstep."""
-    inference_steps: int | None = None
+    inference_steps: Count | None = None
     """Denoising steps; None: the sampler's own number, 25 for DDIM."""
-    friction: float = 1.0
+    friction: NotNegative = 1.0
     """Factor on all friction; 0 shows that grasps hold by friction alone."""
     perturbation: Perturbation = NOMINAL
     """What varies in the pictures."""
-    prediction_noise: float = 0.0
+    prediction_noise: NotNegative = 0.0
     """Standard deviation of noise on each joint of what the upper network says [rad]."""
 
 

@@ -18,6 +18,7 @@ from jaxplan.evaluation.seeds import parse_seeds
 from jaxplan.learning import NoWeights, Weights
 from jaxplan.networks import Cond
 from jaxplan.pretrained import UPPER, load_weights, shipped
+from jaxplan.ranges import Checked
 from jaxplan.samplers import FAMILIES, Bank
 from jaxplan.samplers.bank import SIZE
 
@@ -32,7 +33,7 @@ def results(quick: bool) -> Path:
 
 
 @dataclass(frozen=True)
-class StudyArgs:
+class StudyArgs(Checked):
     """What problems, whose weights, where to."""
 
     task: str = tasks.DEFAULT

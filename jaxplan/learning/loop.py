@@ -4,15 +4,17 @@ import dataclasses
 import json
 import logging
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import jax
 import jax.numpy as jnp
 import numpy as np
+from filelock import FileLock, Timeout
 from tqdm import tqdm
 
 from jaxplan.data import write_atomic
@@ -74,6 +76,7 @@ def fit(
     rows: np.ndarray,
     gather: Callable[[np.ndarray], Any],
     validate: Callable[[Params], Metrics],
+    origin: Mapping[str, Any] = MappingProxyType({}),
 ) -> tuple[TrainState, Metrics]:
     """Trains from the run's newest checkpoint, or from `params`, to `config.steps`.
 
@@ -88,14 +91,37 @@ def fit(
         rows: Rows of the data set to train on.
         gather: Rows [batch_size] to the batch that `loss` takes.
         validate: Metrics of the averaged weights on what was held out.
+        origin: Checksums of all that the weights come from, beside the settings.
 
     Returns:
         The final state and its validation metrics.
 
     Raises:
         TrainingDiverged: Not finite any more; the last good checkpoint is kept.
-        RunError: `run` was begun with other settings, or a batch cannot be split evenly.
+        RunError: `run` was begun with other settings or of another origin, another process
+            trains there, or a batch cannot be split evenly.
     """
+    run.mkdir(parents=True, exist_ok=True)
+    try:
+        with FileLock(run / ".lock", blocking=False):
+            _claim(run, config, origin)
+            return _train(config, run, params, loss, rows, gather, validate)
+    except Timeout:
+        raise RunError(
+            f"another process trains in {run}: choose another --name"
+        ) from None
+
+
+def _train(
+    config: TrainConfig,
+    run: Path,
+    params: Params,
+    loss: Loss,
+    rows: np.ndarray,
+    gather: Callable[[np.ndarray], Any],
+    validate: Callable[[Params], Metrics],
+) -> tuple[TrainState, Metrics]:
+    """`fit`, in a run of one's own."""
     devices = Devices()
     if min(config.batch_size, len(rows)) % devices.count:
         raise RunError(
@@ -103,7 +129,6 @@ def fit(
         )
     tx = optimizer(config.optimizer, config.steps)
     state = devices.replicate(init_state(params, tx))
-    _claim(run, config)
     store = run / "checkpoints"
     if (last := checkpoint.latest(store)) is not None:
         state = checkpoint.restore(store, last, state)
@@ -171,9 +196,9 @@ def held_out(seeds: np.ndarray, fraction: float) -> np.ndarray:
     return np.isin(seeds, unique[order[:count]])
 
 
-def _claim(run: Path, config: TrainConfig) -> None:
-    """Writes `config.json`, or checks that it holds the same settings."""
-    wanted = json.loads(json.dumps(dataclasses.asdict(config)))
+def _claim(run: Path, config: TrainConfig, origin: Mapping[str, Any]) -> None:
+    """Writes `config.json`, or checks that it holds the same settings and origin."""
+    wanted = json.loads(json.dumps(dataclasses.asdict(config) | dict(origin)))
     path = run / "config.json"
     if path.exists() and checkpoint.latest(run / "checkpoints") is not None:
         found = json.loads(path.read_text())

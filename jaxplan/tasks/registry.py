@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from typing import NamedTuple, get_args
 
+from jaxplan import ranges
 from jaxplan.robots import PANDA
 from jaxplan.tasks.mug.poses import STARTS
 from jaxplan.tasks.mug.scene import Variant
@@ -56,9 +57,11 @@ def load(
         perturbation: What varies in the pictures.
 
     Raises:
-        ValueError: There is no such task, or no such variant of it.
+        ValueError: There is no such task, or no such variant of it, or a number makes no sense.
     """
     check(name, variant)
+    ranges.check("batch", batch, ranges.Count)
+    ranges.check("friction", friction, ranges.NotNegative)
     return TASKS[name].make(
         batch,
         variant=variant,
