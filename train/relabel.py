@@ -19,6 +19,7 @@ from jaxplan.learned import learned
 from jaxplan.motion import MotionPlanner
 from jaxplan.pretrained import load_pair, shipped
 from jaxplan.ranges import Checked, Count, Whole
+from jaxplan.tasks.perturbation import NOMINAL, Perturbation
 
 
 @dataclass(frozen=True)
@@ -34,6 +35,8 @@ class Args(Checked):
     camera: str = "hand"
     task: str = tasks.DEFAULT
     variant: str = "plain"
+    perturbation: Perturbation = NOMINAL
+    """What varies in the pictures."""
 
 
 def main(args: Args) -> None:
@@ -53,7 +56,13 @@ def main(args: Args) -> None:
     count = -(-args.episodes // args.shard_size)
     missing = data.missing_shards(args.out, count, settings)
     data.write_manifest(args.out, settings)
-    task = tasks.load(args.task, args.shard_size, args.variant, args.camera)
+    task = tasks.load(
+        args.task,
+        args.shard_size,
+        args.variant,
+        args.camera,
+        perturbation=args.perturbation,
+    )
     planner = MotionPlanner(task.planning_scene, task.robot.limits)
     agent = Algorithm1(task, planner, *learned(task, weights))
     bar = tqdm(missing, unit="shard")
