@@ -4,7 +4,8 @@ import dataclasses
 import json
 import logging
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -101,76 +102,62 @@ def fit(
         RunError: `run` was begun with other settings or of another origin, another process
             trains there, or a batch cannot be split evenly.
     """
-    run.mkdir(parents=True, exist_ok=True)
-    try:
-        with FileLock(run / ".lock", blocking=False):
-            _claim(run, config, origin)
-            return _train(config, run, params, loss, rows, gather, validate)
-    except Timeout:
-        raise RunError(
-            f"another process trains in {run}: choose another --name"
-        ) from None
-
-
-def _train(
-    config: TrainConfig,
-    run: Path,
-    params: Params,
-    loss: Loss,
-    rows: np.ndarray,
-    gather: Callable[[np.ndarray], Any],
-    validate: Callable[[Params], Metrics],
-) -> tuple[TrainState, Metrics]:
-    """`fit`, in a run of one's own."""
     devices = Devices()
     if min(config.batch_size, len(rows)) % devices.count:
         raise RunError(
             f"batch_size {config.batch_size} cannot be split among {devices.count} devices"
         )
-    tx = optimizer(config.optimizer, config.steps)
-    state = devices.replicate(init_state(params, tx))
-    store = run / "checkpoints"
-    if (last := checkpoint.latest(store)) is not None:
-        state = checkpoint.restore(store, last, state)
-        logger.info("resumed %s at step %d", run, last)
-    first = int(state.step)
-    _forget_after(run / "metrics.jsonl", first)
+    with _claimed(run, config, origin):
+        tx = optimizer(config.optimizer, config.steps)
+        state = devices.replicate(init_state(params, tx))
+        store = run / "checkpoints"
+        if (last := checkpoint.latest(store)) is not None:
+            state = checkpoint.restore(store, last, state)
+            logger.info("resumed %s at step %d", run, last)
+        first = int(state.step)
+        _forget_after(run / "metrics.jsonl", first)
 
-    step_fn = jax.jit(partial(train_step, loss, tx, config.optimizer), donate_argnums=0)
-    key = jax.random.key(config.seed)
-    measured: Metrics = {}
-    began = time.perf_counter()
-    bar = tqdm(total=config.steps, initial=first, desc=config.name, unit="step")
-    with bar, (run / "metrics.jsonl").open("a") as log:
-        for step in range(first, config.steps):
-            batch = devices.split(gather(rows_of_step(config, rows, step)))
-            state, metrics = step_fn(state, key, batch)
-            done, last_step = step + 1, step + 1 == config.steps
-            if done % config.log_every == 0 or last_step:
-                values = {name: float(value) for name, value in metrics.items()}
-                _check_finite(values["loss"], done)
-                rate = (
-                    (done - first) * config.batch_size / (time.perf_counter() - began)
-                )
-                _write(log, {"step": done, **values, "examples_per_second": rate})
-                bar.update(done - bar.n)
-                bar.set_postfix_str(
-                    f"loss {values['loss']:.2e}, {rate:.0f} examples/s", refresh=False
-                )
-            if done % config.validate_every == 0 or last_step:
-                measured = validate(state.ema_params)
-                _write(
-                    log, {"step": done, **{f"val_{k}": v for k, v in measured.items()}}
-                )
-                logger.info("step %d: %s", done, _line(measured))
-            if done % config.checkpoint_every == 0 or last_step:
-                _check_finite(float(metrics["loss"]), done)
-                if not _all_finite(state):
-                    raise TrainingDiverged(_diverged("a weight", done))
-                checkpoint.save(store, done, state)
-    if first == config.steps:
-        measured = validate(state.ema_params)
-    return state, measured
+        step_fn = jax.jit(
+            partial(train_step, loss, tx, config.optimizer), donate_argnums=0
+        )
+        key = jax.random.key(config.seed)
+        measured: Metrics = {}
+        began = time.perf_counter()
+        bar = tqdm(total=config.steps, initial=first, desc=config.name, unit="step")
+        with bar, (run / "metrics.jsonl").open("a") as log:
+            for step in range(first, config.steps):
+                batch = devices.split(gather(rows_of_step(config, rows, step)))
+                state, metrics = step_fn(state, key, batch)
+                done, last_step = step + 1, step + 1 == config.steps
+                if done % config.log_every == 0 or last_step:
+                    values = {name: float(value) for name, value in metrics.items()}
+                    _check_finite(values["loss"], done)
+                    rate = (
+                        (done - first)
+                        * config.batch_size
+                        / (time.perf_counter() - began)
+                    )
+                    _write(log, {"step": done, **values, "examples_per_second": rate})
+                    bar.update(done - bar.n)
+                    bar.set_postfix_str(
+                        f"loss {values['loss']:.2e}, {rate:.0f} examples/s",
+                        refresh=False,
+                    )
+                if done % config.validate_every == 0 or last_step:
+                    measured = validate(state.ema_params)
+                    _write(
+                        log,
+                        {"step": done, **{f"val_{k}": v for k, v in measured.items()}},
+                    )
+                    logger.info("step %d: %s", done, _line(measured))
+                if done % config.checkpoint_every == 0 or last_step:
+                    _check_finite(float(metrics["loss"]), done)
+                    if not _all_finite(state):
+                        raise TrainingDiverged(_diverged("a weight", done))
+                    checkpoint.save(store, done, state)
+        if first == config.steps:
+            measured = validate(state.ema_params)
+        return state, measured
 
 
 def rows_of_step(config: TrainConfig, rows: np.ndarray, step: int) -> np.ndarray:
@@ -194,6 +181,22 @@ def held_out(seeds: np.ndarray, fraction: float) -> np.ndarray:
     order = np.argsort([np.random.default_rng([1, int(s)]).random() for s in unique])
     count = min(max(1, round(fraction * len(unique))), max(1, len(unique) - 1))
     return np.isin(seeds, unique[order[:count]])
+
+
+@contextmanager
+def _claimed(
+    run: Path, config: TrainConfig, origin: Mapping[str, Any]
+) -> Iterator[None]:
+    """A run of one's own: nobody else trains there, with these settings of this origin."""
+    run.mkdir(parents=True, exist_ok=True)
+    try:
+        with FileLock(run / ".lock", blocking=False):
+            _claim(run, config, origin)
+            yield
+    except Timeout:
+        raise RunError(
+            f"another process trains in {run}: choose another --name"
+        ) from None
 
 
 def _claim(run: Path, config: TrainConfig, origin: Mapping[str, Any]) -> None:
