@@ -1,7 +1,6 @@
 """The command `jaxplan`."""
 
 import difflib
-import errno
 import io
 import os
 import sys
@@ -14,9 +13,7 @@ import tyro
 from tyro.conf import Positional
 
 from jaxplan.interrupt import CLOSED, INTERRUPTED, end_on_interrupt
-
-BAD_INPUT, FULL = 2, 1
-"""Exit codes; the second one of a full disk."""
+from jaxplan.process import BAD_INPUT, exit_code
 
 
 @dataclass(frozen=True)
@@ -147,7 +144,7 @@ def _guarded(run: Callable[[], int]) -> int:
         return CLOSED
     except (ValueError, RuntimeError, OSError) as error:
         _fail((str(error) or type(error).__name__).splitlines()[0])
-        return FULL if getattr(error, "errno", None) == errno.ENOSPC else BAD_INPUT
+        return exit_code(error)
 
 
 def _plan(command: PlanCommand) -> int:

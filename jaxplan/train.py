@@ -9,7 +9,6 @@ the run's newest checkpoint. `--help` lists every setting.
 import argparse
 import dataclasses
 import difflib
-import errno
 import hashlib
 import logging
 import runpy
@@ -24,13 +23,13 @@ import numpy as np
 import tyro
 
 from jaxplan import data, learning, pretrained
-from jaxplan.cli import BAD_INPUT, FULL
 from jaxplan.learning import predictor, sampler, segments
 from jaxplan.learning.loop import TrainConfig
 from jaxplan.learning.predictor import PredictorTraining
 from jaxplan.learning.sampler import SegmentTraining
 from jaxplan.learning.train_state import Params
 from jaxplan.pretrained import UPPER
+from jaxplan.process import BAD_INPUT, exit_code
 from jaxplan.samplers import FAMILIES, Family, init
 
 Training = PredictorTraining | SegmentTraining
@@ -68,7 +67,7 @@ def main(arguments: list[str] | None = None) -> int:
         return 1
     except OSError as error:
         print(f"error: {error}", file=sys.stderr)
-        return FULL if error.errno == errno.ENOSPC else BAD_INPUT
+        return exit_code(error)
     except ValueError as error:
         known = (
             UsageError,

@@ -31,6 +31,7 @@ from jaxplan import (
     planning,
 )
 from jaxplan import make_world as world_for
+from jaxplan.episodes import EpisodeConfig
 from jaxplan.learning import SegmentTraining, TrainConfig
 from jaxplan.motion.blocks import SIZES
 from jaxplan.motion.checks import seeds_of
@@ -139,7 +140,8 @@ def bad_for(kind, name: str) -> list:
     if kind is str:
         return [value for value in NOTHING if not isinstance(value, str)]
     if dataclasses.is_dataclass(kind):
-        return [*NOTHING, 1.0, PlannerConfig(), kind]
+        others = [*NOTHING, 1.0, PlannerConfig(), EpisodeConfig(), kind]
+        return [value for value in others if not isinstance(value, kind)]
     assert origin is Annotated, f"{name} has no range"
     number, allowed = inner
     bad = [*NOTHING, np.nan, np.inf, -np.inf, True, np.bool_(1), 10**400, "1"]
