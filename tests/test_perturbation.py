@@ -35,6 +35,19 @@ def test_nothing_is_the_picture_as_it_is(task, mug_task):
     np.testing.assert_array_equal(pictures(task, Perturbation(each_query=True)), plain)
 
 
+@pytest.mark.parametrize("variant", ["plain", "cluttered"])
+def test_next_to_nothing_is_the_picture_as_it_is(variant):
+    """What waits out of sight changes neither the near plane nor the shadows."""
+    task, seeds = tasks.load("mug", 3, variant), (4, 5, 6)
+    task.reset(range(3), seeds)
+    for data in task.sim.data:
+        mujoco.mj_forward(task.model, data)  # poses are of a step before
+    plain = task.observe(range(3)).images["hand"]
+    for name in ("translation", "light", "colours"):
+        task.eyes.perturbation = Perturbation(**{name: 1e-12})
+        np.testing.assert_array_equal(task.observe(range(3)).images["hand"], plain)
+
+
 @pytest.mark.parametrize("kind", KINDS)
 def test_each_kind_changes_pictures_and_nothing_else(task, kind):
     plain = pictures(task, NOMINAL)

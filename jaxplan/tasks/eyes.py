@@ -1,5 +1,6 @@
 """The pictures that a batch of episodes is seen by, as they are or perturbed."""
 
+import copy
 from collections.abc import Callable
 from functools import cached_property
 
@@ -52,7 +53,12 @@ class Eyes:
     @cached_property
     def _look(self) -> Look:
         """Made for the first picture that is perturbed."""
-        return Look(self._make_look(), self.name, self.image, REACH)
+        model = copy.copy(self._make_look())
+        # The near plane and the shadows are in units of the model's size, which grows with
+        # what waits out of sight.
+        model.stat.extent = self._model.stat.extent
+        model.stat.center[:] = self._model.stat.center
+        return Look(model, self.name, self.image, REACH)
 
     def begin(self, lane: int, seed: int) -> None:
         """An episode begins."""
