@@ -43,7 +43,7 @@ def test_next_to_nothing_is_the_picture_as_it_is(variant):
     for data in task.sim.data:
         mujoco.mj_forward(task.model, data)  # poses are of a step before
     plain = task.observe(range(3)).images["hand"]
-    for name in ("translation", "light", "colours"):
+    for name in ("yaw", "pitch", "translation", "light"):
         task.eyes.perturbation = Perturbation(**{name: 1e-12})
         np.testing.assert_array_equal(task.observe(range(3)).images["hand"], plain)
 
