@@ -50,7 +50,8 @@ def kinds() -> dict[str, type]:
 
 def main(arguments: list[str] | None = None) -> int:
     """Runs the command; 0 when done, 2 for bad input, 1 when training diverged."""
-    logging.basicConfig(level=logging.INFO, format="%(message)s")
+    # By force: a library has put its own handler there, which shows warnings only.
+    logging.basicConfig(level=logging.INFO, format="%(message)s", force=True)
     logging.getLogger("absl").setLevel(logging.WARNING)
     try:
         config = parse(sys.argv[1:] if arguments is None else arguments)

@@ -402,6 +402,7 @@ def test_training_starts_from_given_weights(demos, tmp_path, monkeypatch, capsys
     other = [*still, "--network.hidden", "16", "--name", "other"]
     assert train.main([*command, *other]) == 2
     said = capsys.readouterr().err
+    assert "weights: second/predictor.npz" in said
     assert "error: first holds a predictor" in said
     assert "see params/" in said
 
