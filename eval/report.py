@@ -52,13 +52,19 @@ SECTIONS = (
     Section(
         "robustness",
         "Table 5: other cameras, noise, light, colours",
-        ("robustness_plain", "robustness_cluttered", "robustness_without_variation"),
+        (
+            "robustness_plain",
+            "robustness_plain_beyond",
+            "robustness_cluttered",
+            "robustness_without_variation",
+        ),
         "python eval/robustness.py --out eval/results/robustness_plain.json",
         "The hand's camera is turned about its own upright and sideways axes and shifted along all "
         "three, once an episode, or anew for each picture. Light, colours and a distractor are not "
         "in the paper. `robustness_without_variation` is of weights that saw one camera only in "
         "training. A toggle error needs phases that end in a toggle: where most episodes fail it "
-        "says little.",
+        "says little.\n\n![One scene under each setting, the expert's toggles as discs, predicted "
+        "ones as crosses](../figures/robustness.png)",
         summary.robustness,
     ),
     Section(

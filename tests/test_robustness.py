@@ -56,13 +56,15 @@ def test_files_stand_side_by_side_in_the_summary():
     found = summary(result([None, "dropped"]))
     files = {
         "robustness_plain": {"settings": {"nominal": found, "mild": found}},
+        "robustness_plain_beyond": {"settings": {"light": found}},
         "robustness_without_variation": {"settings": {"mild": found}},
     }
     shown = robustness(files)
-    assert shown.columns[1::2] == ["plain, %", "without variation, %"]
-    assert [row[0] for row in shown.rows] == ["nominal", "mild"]
-    assert shown.rows[0][3:] == [None, None]
-    assert shown.rows[1][3].value == 50
+    assert shown.columns[2::3] == ["plain, success %", "without variation, success %"]
+    assert [row[0] for row in shown.rows] == ["nominal", "mild", "light"]
+    assert shown.rows[0][4:] == [None] * 3
+    assert shown.rows[1][5].value == 50
+    assert shown.rows[2][1] == 2
 
 
 def test_the_paper_s_settings_are_there():

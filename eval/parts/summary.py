@@ -9,6 +9,9 @@ from jaxplan.evaluation.tables import Cell, Estimate, Table
 PAPER_SUCCESS, PAPER_NOMINAL, PAPER_ERROR = 95.67, 96.0, 0.0112
 """Success of Table 1 and of Table 5 [%], toggle error of Table 5 [rad]."""
 
+OF_SETTING = ", episodes", ", success %", ", nearest toggle [rad]"
+"""Columns of Table 5 for each of the weights."""
+
 Found = dict[str, dict[str, Any]]
 """By the name of the file: what it says."""
 
@@ -34,21 +37,21 @@ def success(found: Found) -> Table:
 
 
 def robustness(found: Found) -> Table:
-    """A row a setting: success and error to the nearest toggle, of each file."""
-    columns, rows = [""], {}
+    """A row a setting: success and error to the nearest toggle, of each of the weights."""
+    weights: list[str] = []
+    rows: dict[str, dict[str, list[Cell]]] = {}
     for name, result in found.items():
-        of = name.partition("_")[2].replace("_", " ")
-        columns += [f"{of}, %", f"{of}, nearest toggle [rad]"]
+        of = name.removeprefix("robustness_").removesuffix("_beyond").replace("_", " ")
+        weights += [] if of in weights else [of]
         for setting, one in result["settings"].items():
-            rows.setdefault(setting, {})[name] = (
-                rate(one),
-                one["toggle_error_nearest"],
-            )
+            cells = [one["trials"], rate(one), one["toggle_error_nearest"]]
+            rows.setdefault(setting, {})[of] = cells
+    columns = [f"{of}{what}" for of in weights for what in OF_SETTING]
     body = [
-        [setting, *(cell for name in found for cell in by.get(name, (None, None)))]
+        [setting, *(cell for of in weights for cell in by.get(of, [None] * 3))]
         for setting, by in rows.items()
     ]
-    return Table("", columns, body)
+    return Table("", ["", *columns], body)
 
 
 def recovery(found: Found) -> Table:
