@@ -28,6 +28,7 @@ from jaxplan.learning.loop import TrainConfig
 from jaxplan.learning.predictor import PredictorTraining
 from jaxplan.learning.sampler import SegmentTraining
 from jaxplan.learning.train_state import Params
+from jaxplan.learning.weights import merged
 from jaxplan.pretrained import UPPER
 from jaxplan.process import BAD_INPUT, exit_code
 from jaxplan.samplers import FAMILIES, Family, init
@@ -55,7 +56,8 @@ def main(arguments: list[str] | None = None) -> int:
     logging.getLogger("absl").setLevel(logging.WARNING)
     try:
         config = parse(sys.argv[1:] if arguments is None else arguments)
-        _check_writable(config)
+        data.check_writable(RUNS, True, "the directory of runs,")
+        data.check_writable(config.out or RUNS, True, "--out")
         if isinstance(config, PredictorTraining):
             path = train_predictor(config)
         else:
@@ -73,6 +75,7 @@ def main(arguments: list[str] | None = None) -> int:
         known = (
             UsageError,
             data.DataError,
+            data.UnwritableError,
             learning.WeightsError,
             learning.CheckpointError,
             learning.RunError,
@@ -113,16 +116,6 @@ def parse(arguments: list[str]) -> Training:
     return config
 
 
-def _check_writable(config: Training) -> None:
-    """Before hours of work."""
-    try:
-        data.check_writable(RUNS, True, "the directory of runs,")
-        if config.out is not None:
-            data.check_writable(config.out, True, "--out")
-    except ValueError as error:
-        raise UsageError(str(error)) from None
-
-
 def train_predictor(config: PredictorTraining) -> Path:
     """Trains the upper network and exports it; returns the weights' path."""
     shard, origin = _read(config)
@@ -149,8 +142,7 @@ def train_sampler(family: Family, config: SegmentTraining) -> Path:
     if config.network.encoder is None:
         upper = pretrained.load_weights(UPPER, config.predictor)
     teacher = _teacher(family, config, upper)
-    taught = partial(family.loss, config)
-    loss = taught if teacher is None else partial(taught, teacher)
+    loss = partial(family.loss, config, *([] if teacher is None else [teacher]))
     shard, origin = _read(config)
     image = shard.image if upper is None else _features(upper, shard, origin["data"])
     for name, weights in (("predictor", upper), ("teacher", teacher)):
@@ -251,28 +243,12 @@ def _initial(config: Training, kind: str, fresh: Params) -> Params:
         return fresh
     weights = pretrained.load_weights(kind, config.init)
     try:
-        return _merged(fresh, jax.tree.map(jnp.asarray, weights.params))
+        return merged(fresh, jax.tree.map(jnp.asarray, weights.params))
     except KeyError as error:
         layer = "/".join(error.args[0])
         raise UsageError(
             f"{config.init} holds a {kind} with other --network settings: see {layer}"
         ) from None
-
-
-def _merged(fresh: Params, known: Params, at: tuple[str, ...] = ()) -> Params:
-    """`fresh` with the arrays of `known` in place of its own; a network may have more.
-
-    Raises:
-        KeyError: `known` has an array that `fresh` has not, or has in another shape.
-    """
-    if not isinstance(known, dict):
-        if isinstance(fresh, dict) or np.shape(fresh) != known.shape:
-            raise KeyError(at)
-        return known
-    if not isinstance(fresh, dict) or not known.keys() <= fresh.keys():
-        raise KeyError(at)
-    more = {name: _merged(fresh[name], known[name], (*at, name)) for name in known}
-    return {**fresh, **more}
 
 
 def _export(

@@ -1,5 +1,6 @@
 """What a demonstration is: schema, shards on disk, checksums."""
 
+from jaxplan.data.files import UnwritableError as UnwritableError
 from jaxplan.data.files import check_writable as check_writable
 from jaxplan.data.files import sha256 as sha256
 from jaxplan.data.files import write_atomic as write_atomic

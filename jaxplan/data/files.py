@@ -29,6 +29,10 @@ def write_atomic(path: str | os.PathLike, content: bytes) -> None:
     os.replace(beside, path)
 
 
+class UnwritableError(ValueError):
+    """Nothing can be written where it is wanted."""
+
+
 def check_writable(path: str | os.PathLike, directory: bool, name: str) -> None:
     """Finds out before hours of work whether something can be written.
 
@@ -38,20 +42,21 @@ def check_writable(path: str | os.PathLike, directory: bool, name: str) -> None:
         name: Of the setting, for the message.
 
     Raises:
-        ValueError: It cannot.
+        UnwritableError: It cannot.
     """
     path = Path(path)
     if path.is_dir() and not directory:
-        raise ValueError(f"{name} {path}: is a directory")
+        raise UnwritableError(f"{name} {path}: is a directory")
     place = path if directory else path.parent
     while not place.exists():
         place = place.parent
     if not place.is_dir():
-        raise ValueError(f"{name} {path}: {place} is a file")
+        raise UnwritableError(f"{name} {path}: {place} is a file")
     try:
         tempfile.TemporaryFile(dir=place).close()
     except OSError as error:
-        raise ValueError(f"{name} {path}: {place}: {error.strerror}") from None
+        said = f"{name} {path}: {place}: {error.strerror}"
+        raise UnwritableError(said) from None
 
 
 def write_npz(path: str | os.PathLike, arrays: Mapping[str, np.ndarray]) -> None:

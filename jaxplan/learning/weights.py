@@ -2,6 +2,8 @@
 
 from typing import Any, NamedTuple
 
+import numpy as np
+
 
 class WeightsError(ValueError):
     """Weights are missing, damaged, or do not belong together."""
@@ -37,3 +39,21 @@ class Weights(NamedTuple):
                     f"{self.info.get('file')} was trained for {noun}{', '.join(trained)}, "
                     f"not {asked}"
                 )
+
+
+def merged(
+    fresh: dict[str, Any], known: dict[str, Any], at: tuple[str, ...] = ()
+) -> dict[str, Any]:
+    """`fresh` with the arrays of `known` in place of its own; a network may have more.
+
+    Raises:
+        KeyError: `known` has an array that `fresh` has not, or has in another shape.
+    """
+    if not isinstance(known, dict):
+        if isinstance(fresh, dict) or np.shape(fresh) != known.shape:
+            raise KeyError(at)
+        return known
+    if not isinstance(fresh, dict) or not known.keys() <= fresh.keys():
+        raise KeyError(at)
+    more = {name: merged(fresh[name], known[name], (*at, name)) for name in known}
+    return {**fresh, **more}

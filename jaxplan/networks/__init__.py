@@ -17,6 +17,7 @@ from jaxplan.networks.predictor import as_subgoal as as_subgoal
 from jaxplan.networks.predictor import predict as predict
 from jaxplan.networks.resnet import Encoder as Encoder
 from jaxplan.networks.resnet import EncoderConfig as EncoderConfig
+from jaxplan.networks.rows import row_by_row as row_by_row
 from jaxplan.networks.sampler import FewStepConfig as FewStepConfig
 from jaxplan.networks.sampler import SamplerConfig as SamplerConfig
 from jaxplan.networks.sampler import SamplerNetwork as SamplerNetwork

@@ -10,7 +10,7 @@ import numpy as np
 
 from jaxplan.collision import XLA_OPTIONS
 from jaxplan.learning.weights import Weights
-from jaxplan.networks import Cond
+from jaxplan.networks import Cond, row_by_row
 from jaxplan.planning import DrawBank, Segment
 from jaxplan.samplers.families import draw
 
@@ -49,16 +49,8 @@ class Bank:
 
     @cached_property
     def _draw_each(self) -> Any:
-        """One problem after the other: a network at another batch size differs in the last bits."""
-
-        def one(asked: Any) -> Segment:
-            alone = self._drawn(*jax.tree.map(lambda leaf: leaf[None], asked))
-            return jax.tree.map(lambda leaf: leaf[0], alone)
-
-        def each(cond: Cond, keys: jax.Array, number: jax.Array) -> Segment:
-            return jax.lax.map(one, (cond, keys, number))
-
-        return jax.jit(each, compiler_options=XLA_OPTIONS)
+        """One problem after the other."""
+        return jax.jit(row_by_row(self._drawn), compiler_options=XLA_OPTIONS)
 
     def _drawn(self, cond: Cond, keys: jax.Array, number: jax.Array) -> Segment:
         keys = jax.vmap(jax.random.fold_in)(keys, number)
