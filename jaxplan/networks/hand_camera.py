@@ -41,7 +41,11 @@ class HandCameraConfig(Checked):
 ERROR_SCALE = jnp.array([0.2, 0.2, 0.02, 0.02, 0.02])
 """In which a camera's error is said and judged [rad, m]."""
 
+exact = jax.default_matmul_precision("highest")
+"""The default of GPUs, ten bits, would move what is seen by millimetres."""
 
+
+@exact
 def camera_pose(
     config: HandCameraConfig, q: jax.Array, error: jax.Array | None = None
 ) -> tuple[jax.Array, jax.Array]:
@@ -73,6 +77,7 @@ def camera_pose(
     return position + shift, axes @ turn
 
 
+@exact
 def on_plane(
     config: HandCameraConfig,
     image: jax.Array,

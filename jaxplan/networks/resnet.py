@@ -134,7 +134,9 @@ def spatial_softmax(maps: jax.Array) -> jax.Array:
         jnp.linspace(-1.0, 1.0, height), jnp.linspace(-1.0, 1.0, width), indexing="ij"
     )
     grid = jnp.stack([x.ravel(), y.ravel()])
-    return jnp.einsum("bpk,cp->bkc", weights, grid).reshape(batch, 2 * count)
+    # Ten bits, a GPU's default, would be coarser than what the keypoints are read to.
+    points = jnp.einsum("bpk,cp->bkc", weights, grid, precision="highest")
+    return points.reshape(batch, 2 * count)
 
 
 def _stem(config: EncoderConfig, x: jax.Array) -> jax.Array:
