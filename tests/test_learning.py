@@ -6,6 +6,7 @@ import os
 import runpy
 import subprocess
 import sys
+from functools import partial
 from pathlib import Path
 
 import jax
@@ -272,7 +273,10 @@ def test_weights_round_trip_and_damage(tmp_path):
     )
     weights = pretrained.load_weights("predictor", tmp_path)
     assert weights.config == config
-    jax.tree.map(np.testing.assert_array_equal, weights.params, params)
+    same = partial(np.testing.assert_allclose, rtol=2.0**-17)
+    jax.tree.map(same, weights.params, params)
+    again = pretrained.save_weights(tmp_path / "2", "predictor", *weights[:2][::-1], {})
+    assert again.read_bytes() == path.read_bytes()
     with pytest.raises(learning.WeightsError, match="no sampler in"):
         pretrained.load_weights("sampler", tmp_path)
     content = bytearray(path.read_bytes())
@@ -396,8 +400,11 @@ def test_training_starts_from_given_weights(demos, tmp_path, monkeypatch, capsys
     command = ["predictor", "--config", str(CONFIGS / "debug.py"), "--data", demos]
     still = ["--steps", "1", "--optimizer.learning-rate", "0", "--init", "first"]
     assert train.main([*command, *still, "--out", "second"]) == 0
-    second = pretrained.load_weights("predictor", "second").params
-    for a, b in zip(jax.tree.leaves(params), jax.tree.leaves(second), strict=True):
+    first, second = (
+        jax.tree.leaves(pretrained.load_weights("predictor", name).params)
+        for name in ("first", "second")
+    )
+    for a, b in zip(first, second, strict=True):
         np.testing.assert_allclose(a, b, atol=1e-6)
     other = [*still, "--network.hidden", "16", "--name", "other"]
     assert train.main([*command, *other]) == 2
@@ -439,3 +446,14 @@ def test_a_calibrating_predictor_starts_from_one_that_does_not(
         np.testing.assert_allclose(leaf, more[place], atol=1e-6)
     assert "camera_error" in second.params["params"]
     assert run("plain", "--init", "second", "--name", "back") == 2
+
+
+def test_exported_weights_are_shortened_to_16_bits_of_mantissa(tmp_path):
+    rng = np.random.default_rng(0)
+    x = (rng.normal(size=4096) * 10.0 ** rng.integers(-30, 30, 4096)).astype(np.float32)
+    short = store._shortened(x)
+    assert np.all(np.abs(short - x) <= np.abs(x) * 2.0**-17)
+    assert np.all(short.view(np.uint32) & 0x7F == 0)
+    np.testing.assert_array_equal(store._shortened(short), short)
+    special = np.array([0.0, -0.0, 1.0, np.inf, -np.inf], np.float32)
+    np.testing.assert_array_equal(store._shortened(special), special)

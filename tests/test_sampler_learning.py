@@ -168,8 +168,8 @@ def test_shipped_weights_say_what_they_are_for():
     for variant, task in (("plain", "mug"), ("cluttered", "mug_cluttered")):
         for name in train.kinds():
             info = pretrained.load_weights(name, shipped(variant)).info
-            found = info["tasks"], info["cameras"], info["robots"]
-            assert found == ([task], ["hand"], ["panda"])
+            assert (info["cameras"], info["robots"]) == (["hand"], ["panda"])
+            assert task in info["tasks"]
 
 
 def test_a_pupil_needs_its_teachers_predictor(trained, demos, tmp_path, capsys):

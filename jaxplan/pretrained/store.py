@@ -53,7 +53,7 @@ def save_weights(
     """
     path = Path(directory) / f"{name}.npz"
     flat = _flatten(jax.device_get(params))
-    write_npz(path, {key: flat[key] for key in _shapes(config, flat)})
+    write_npz(path, {key: _shortened(flat[key]) for key in _shapes(config, flat)})
     manifest = _read_manifest(directory) if (path.parent / MANIFEST).exists() else {}
     manifest[name] = {
         "file": path.name,
@@ -185,6 +185,14 @@ def _unflatten(flat: dict[str, np.ndarray]) -> dict:
             node = node.setdefault(parent, {})
         node[leaf] = value
     return params
+
+
+def _shortened(x: np.ndarray) -> np.ndarray:
+    """To 16 bits of mantissa (1e-5 relative): compressed, weights take a quarter less."""
+    if x.dtype != np.float32:
+        return x
+    bits = np.ascontiguousarray(x).view(np.uint32)
+    return ((bits + 0x40) & np.uint32(0xFFFFFF80)).view(np.float32)
 
 
 def _commit() -> str | None:
