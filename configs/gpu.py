@@ -1,11 +1,14 @@
-"""The shipped predictor, of both scenes. For a GPU.
-
-    python -m jaxplan.train predictor --config configs/gpu.py --data data/mug_camera data/mug_all \
-        data/cluttered_camera data/cluttered_all
+"""The predictor of both scenes. For a GPU; train/README.md has the commands.
 
 Three times the compact encoder: two blocks a stage, and keypoints at the finest stage too. On a
 CPU a prediction takes 6 ms instead of 2.4, but training 3 times as long. The samplers need no
 GPU: `compact.py` has them.
+
+From 1,168 episodes of varied pictures, 80 s on one H100: held-out toggle error 0.045 rad in the
+mean, and in the cluttered scene 300 of 300 unseen seeds end in the box, as they do with the camera
+off by 5 degrees and 1 cm. 15,000 steps more brought 0.034 (0.031 with twice the channels), the
+last 5,000 nothing: by then the training loss was a tenth of what it had been. What is missing are
+episodes.
 """
 
 import runpy
@@ -24,7 +27,5 @@ predictor = replace(
         encoder=replace(compact.network.encoder, blocks=(2, 2, 2), scales=3),
     ),
     batch_size=128,
-    steps=20_000,
-    validate_every=5000,
-    checkpoint_every=5000,
+    steps=6500,
 )

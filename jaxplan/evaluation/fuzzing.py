@@ -33,6 +33,8 @@ BAND = 1e-4
 """Distances within this of contact [m] have no verdict: which side they are on is rounding."""
 ALIKE = 1e-5
 """Distances of two programs differ by rounding only [m]."""
+COMPARED = -0.01, 1.0
+"""Those between [m]. How deep an overlap is, is searched for: found to 3e-4 of itself."""
 REACH = 0.05
 """Distances are compared up to this [m]."""
 STEP = 0.002
@@ -115,9 +117,8 @@ class _Examiner:
         same = plan.path.shape == other.path.shape
         if not late and not (same and np.allclose(plan.path, other.path, atol=ALIKE)):
             yield f"alone {plan.status.name}, in a batch {other.status.name}: not the same"
-        off = np.abs(
-            np.minimum(planner.clearance(q, other.world), 1) - np.minimum(ours, 1)
-        )
+        own = planner.clearance(q, other.world)
+        off = np.abs(np.clip(own, *COMPARED) - np.clip(ours, *COMPARED))
         if not off.max() < ALIKE:
             yield f"the planner's own distances are up to {off.max()} others"
 
