@@ -49,6 +49,8 @@ class ClosedLoopConfig(Checked):
     """Factor on all friction; 0 shows that grasps hold by friction alone."""
     perturbation: Perturbation = NOMINAL
     """What varies in the pictures."""
+    objects: str = "one"
+    """Which objects the episodes have: one, train, held_out."""
     prediction_noise: NotNegative = 0.0
     """Standard deviation of noise on each joint of what the upper network says [rad]."""
 
@@ -79,6 +81,7 @@ class ClosedLoop:
             config.camera,
             config.friction,
             config.perturbation,
+            config.objects,
         )
         self.learned = learned(self.task, weights, config.inference_steps)
         self.planner = MotionPlanner(

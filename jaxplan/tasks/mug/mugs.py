@@ -1,0 +1,89 @@
+"""Which mugs there are: one, or one for each episode, drawn from its seed."""
+
+import colorsys
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from jaxplan.tasks.mug.mug import MugShape
+
+Mugs = Literal["one", "train", "held_out"]
+"""`one` is the same mug in all episodes; those that are `held_out` differ from all of `train`
+in each number."""
+STREAM = 4
+"""Of random numbers, beside those that the episode itself takes from its seed."""
+BELOW_RIM = 0.017
+"""Where the handle ends [m]."""
+GRIP = 0.016
+"""And how far below that a hand takes it [m]."""
+
+Spans = tuple[tuple[float, float], ...]
+
+
+class MugRange(NamedTuple):
+    """What is drawn, each number uniformly from some spans."""
+
+    radius: Spans
+    """[m]."""
+    height: Spans
+    """[m]."""
+    handle_depth: Spans
+    """From the cup's outside to the handle's [m]."""
+    handle_share: Spans
+    """The handle's length by the mug's height."""
+    mass: Spans
+    """[kg]."""
+    hue: Spans
+    """Of the colour, 0 to 1 around the circle from red to red."""
+    saturation: Spans = ((0.35, 0.9),)
+    value: Spans = ((0.3, 0.9),)
+
+
+RANGES: dict[Mugs, MugRange] = {
+    "train": MugRange(
+        radius=((0.034, 0.046),),
+        height=((0.080, 0.110),),
+        handle_depth=((0.031, 0.039),),
+        handle_share=((0.45, 0.55),),
+        mass=((0.15, 0.30),),
+        hue=((0.0, 0.78), (0.95, 1.0)),
+    ),
+    "held_out": MugRange(
+        radius=((0.032, 0.034), (0.046, 0.049)),
+        height=((0.074, 0.080), (0.110, 0.116)),
+        handle_depth=((0.028, 0.031), (0.039, 0.042)),
+        handle_share=((0.42, 0.45), (0.55, 0.58)),
+        mass=((0.10, 0.15), (0.30, 0.36)),
+        hue=((0.80, 0.93),),
+    ),
+}
+
+
+def mug_of(mugs: Mugs, seed: int) -> MugShape:
+    """The mug of an episode."""
+    if mugs == "one":
+        return MugShape()
+    rng = np.random.default_rng([seed, STREAM])
+    drawn = (_within(spans, rng.random()) for spans in RANGES[mugs])
+    radius, height, depth, share, mass, *colour = drawn
+    high = height - BELOW_RIM
+    return MugShape(
+        radius=radius,
+        height=height,
+        mass=mass,
+        handle_reach=radius + depth,
+        handle_low=high - share * height,
+        handle_high=high,
+        grip_height=high - GRIP,
+        colour=colorsys.hsv_to_rgb(*colour),
+    )
+
+
+def _within(spans: Spans, share: float) -> float:
+    """That far through the spans, one after the other."""
+    at = share * sum(high - low for low, high in spans)
+    for low, high in spans:
+        if at <= high - low:
+            return low + at
+        at -= high - low
+    return spans[-1][1]
