@@ -93,10 +93,23 @@ class ClosedLoop:
         # One phase of one episode compiles all, so that no planning time includes it.
         self._episodes([0], EpisodeConfig(max_phases=1))
 
-    def perturb(self, perturbation: Perturbation) -> None:
-        """Lets other things vary in the pictures from now on; nothing compiles anew."""
-        self.config = dataclasses.replace(self.config, perturbation=perturbation)
+    def perturb(self, perturbation: Perturbation, objects: str | None = None) -> None:
+        """Lets other things vary from now on; nothing compiles anew.
+
+        Args:
+            perturbation: In the pictures.
+            objects: The episodes'; as before where None.
+
+        Raises:
+            ValueError: One object for all where the loop began with drawn ones, or the
+                other way round.
+        """
+        objects = objects or self.config.objects
+        self.task.draw(objects)
         self.task.eyes.perturbation = perturbation
+        self.config = dataclasses.replace(
+            self.config, perturbation=perturbation, objects=objects
+        )
 
     def run(
         self,

@@ -5,13 +5,13 @@ from typing import NamedTuple, get_args
 
 from jaxplan import ranges
 from jaxplan.robots import PANDA
-from jaxplan.tasks.mug.mugs import Mugs
+from jaxplan.tasks.mug.mugs import RANGES
 from jaxplan.tasks.mug.poses import STARTS
 from jaxplan.tasks.mug.scene import Variant
 from jaxplan.tasks.mug.task import MugTask
 from jaxplan.tasks.perturbation import NOMINAL, Perturbation
 from jaxplan.tasks.starts import Starts
-from jaxplan.tasks.tabletop import Tabletop, full_name
+from jaxplan.tasks.tabletop import ONE, Tabletop, full_name
 
 
 class TaskEntry(NamedTuple):
@@ -25,13 +25,13 @@ class TaskEntry(NamedTuple):
     """Whose arm it is for."""
     starts: Starts | None = None
     """What is drawn at random at the start of an episode."""
-    objects: tuple[str, ...] = ("one",)
-    """Which objects its episodes may have; the first are the usual ones."""
+    objects: tuple[str, ...] = (ONE,)
+    """Which objects its episodes may have."""
 
 
 TASKS = {
     "mug": TaskEntry(
-        MugTask, get_args(Variant), PANDA.name, STARTS, objects=get_args(Mugs)
+        MugTask, get_args(Variant), PANDA.name, STARTS, objects=(ONE, *RANGES)
     )
 }
 
@@ -52,7 +52,7 @@ def load(
     camera: str = "hand",
     friction: float = 1.0,
     perturbation: Perturbation = NOMINAL,
-    objects: str = "one",
+    objects: str = ONE,
 ) -> Tabletop:
     """A batch of episodes of a task.
 
@@ -82,7 +82,7 @@ def load(
     )
 
 
-def check(name: str, variant: str = "plain", objects: str = "one") -> str:
+def check(name: str, variant: str = "plain", objects: str = ONE) -> str:
     """The name that demonstrations and weights have of a task's variant.
 
     Raises:

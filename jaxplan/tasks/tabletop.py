@@ -25,6 +25,8 @@ from jaxplan.tasks.perturbation import NOMINAL, Perturbation
 from jaxplan.tasks.poses import from_matrix, to_matrix
 from jaxplan.tasks.watch import Watch
 
+ONE = "one"
+"""Of objects: the same in all episodes."""
 RETREAT = 0.10
 """How far the hand backs off along its own axis after a release [m]."""
 
@@ -51,7 +53,7 @@ class Tabletop(ABC):
         perturbation: What varies in the pictures.
         look: Makes what perturbed ones are taken of, with the model's joints; the model itself
             where None.
-        shaped: Lanes may be given objects of other shapes (`give`).
+        objects: Which objects episodes have: `ONE` for all, or each lane is given its own.
 
     Raises:
         ValueError: There is no such camera.
@@ -70,15 +72,16 @@ class Tabletop(ABC):
         image: tuple[int, int],
         perturbation: Perturbation = NOMINAL,
         look: Callable[[], mujoco.MjModel] | None = None,
-        shaped: bool = False,
+        objects: str = ONE,
     ) -> None:
         self.name, self.robot, self.model, self.batch = name, robot, model, batch
         self.camera = camera
         self.sim = Simulator(robot, model, batch)
         self.closed = np.zeros(batch, bool)
         self.planning_scene = Scene.from_mjcf(
-            planning, shaped=[movable] if shaped else []
+            planning, shaped=[] if objects == ONE else [movable]
         )
+        self.objects = objects
         rows, numbers = list(self.planning_scene.shaped), self.planning_scene.model
         own = (np.asarray(leaf)[rows] for leaf in (numbers.geom_pos, numbers.geom_size))
         self._geoms = [tuple(own)] * batch
@@ -97,6 +100,19 @@ class Tabletop(ABC):
         self._allowed = {
             key: self.planning_scene.ignored(names) for key, names in allowed.items()
         }
+
+    def draw(self, objects: str) -> None:
+        """Takes other objects from the next episodes on.
+
+        Raises:
+            ValueError: Lanes would need another planning scene.
+        """
+        if (objects == ONE) == bool(self.planning_scene.shaped):
+            raise ValueError(
+                f"objects {objects!r} in a task that was made with {self.objects!r}: "
+                "make another"
+            )
+        self.objects = objects
 
     def expert_planner(self) -> MotionPlanner:
         """The planner of demonstrations, and of recorded problems."""

@@ -88,9 +88,10 @@ def planning_spheres(shape: MugShape) -> list[tuple[np.ndarray, float]]:
     """
     ring, half = shape.radius - 0.006, shape.height / 2
     heights = np.linspace(-half + 0.0095, half - 0.0095, 5)
-    # The outside between four spheres sticks out by 3 mm at most.
-    across = abs(shape.radius * np.exp(1j * np.pi / 12) - ring)
-    farthest = np.hypot(across, (heights[1] - heights[0]) / 2)
+    # The outside between spheres, and the rim, stick out by 3 mm at most.
+    corner = shape.radius / np.cos(np.pi / 24) * np.exp(1j * np.pi / 12)
+    beside = max(0.0095, (heights[1] - heights[0]) / 2)
+    farthest = np.hypot(abs(corner - ring), beside)
     radius = max(0.012, float(farthest) - 0.003)
     spheres = [
         (np.array([ring * np.cos(angle), ring * np.sin(angle), z]), radius)

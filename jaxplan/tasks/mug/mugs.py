@@ -1,15 +1,12 @@
-"""Which mugs there are: one, or one for each episode, drawn from its seed."""
+"""Mugs drawn from episodes' seeds: some to train with, others that nobody trained on."""
 
 import colorsys
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from jaxplan.tasks.mug.mug import MugShape
 
-Mugs = Literal["one", "train", "held_out"]
-"""`one` is the same mug in all episodes; those that are `held_out` differ from all of `train`
-in each number."""
 STREAM = 4
 """Of random numbers, beside those that the episode itself takes from its seed."""
 BELOW_RIM = 0.017
@@ -29,8 +26,9 @@ class MugRange(NamedTuple):
     """[m]."""
     handle_depth: Spans
     """From the cup's outside to the handle's [m]."""
-    handle_share: Spans
-    """The handle's length by the mug's height."""
+    handle_length: Spans
+    """From its upper end to its lower one [m]: pads are 17 mm high and must not touch both of
+    the arms that it hangs on, or contacts are as many as make the solver fling the mug."""
     mass: Spans
     """[kg]."""
     hue: Spans
@@ -39,40 +37,39 @@ class MugRange(NamedTuple):
     value: Spans = ((0.3, 0.9),)
 
 
-RANGES: dict[Mugs, MugRange] = {
+RANGES = {
     "train": MugRange(
         radius=((0.034, 0.046),),
         height=((0.080, 0.110),),
         handle_depth=((0.031, 0.039),),
-        handle_share=((0.45, 0.55),),
+        handle_length=((0.042, 0.052),),
         mass=((0.15, 0.30),),
         hue=((0.0, 0.78), (0.95, 1.0)),
     ),
     "held_out": MugRange(
         radius=((0.032, 0.034), (0.046, 0.049)),
-        height=((0.074, 0.080), (0.110, 0.116)),
+        height=((0.076, 0.080), (0.110, 0.116)),
         handle_depth=((0.028, 0.031), (0.039, 0.042)),
-        handle_share=((0.42, 0.45), (0.55, 0.58)),
+        handle_length=((0.038, 0.042), (0.052, 0.056)),
         mass=((0.10, 0.15), (0.30, 0.36)),
         hue=((0.80, 0.93),),
     ),
 }
+"""Those that are `held_out` are beyond all of `train` in each number but two of the colour's."""
 
 
-def mug_of(mugs: Mugs, seed: int) -> MugShape:
-    """The mug of an episode."""
-    if mugs == "one":
-        return MugShape()
+def mug_of(name: str, seed: int) -> MugShape:
+    """The mug of an episode, from one of `RANGES`."""
     rng = np.random.default_rng([seed, STREAM])
-    drawn = (_within(spans, rng.random()) for spans in RANGES[mugs])
-    radius, height, depth, share, mass, *colour = drawn
+    drawn = (_within(spans, rng.random()) for spans in RANGES[name])
+    radius, height, depth, length, mass, *colour = drawn
     high = height - BELOW_RIM
     return MugShape(
         radius=radius,
         height=height,
         mass=mass,
         handle_reach=radius + depth,
-        handle_low=high - share * height,
+        handle_low=high - length,
         handle_high=high,
         grip_height=high - GRIP,
         colour=colorsys.hsv_to_rgb(*colour),

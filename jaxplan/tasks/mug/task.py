@@ -15,7 +15,7 @@ from jaxplan.tasks.mug.mug import MugShape, planning_geoms
 from jaxplan.tasks.mug.watch import MugWatch
 from jaxplan.tasks.mug.way import expert_planner
 from jaxplan.tasks.perturbation import NOMINAL, Perturbation
-from jaxplan.tasks.tabletop import Tabletop, full_name
+from jaxplan.tasks.tabletop import ONE, Tabletop, full_name
 
 SETTLE = 0.8
 """Time to come to rest after the drop [s]."""
@@ -30,7 +30,7 @@ class MugTask(Tabletop):
         friction: Factor on all friction; 0 shows that grasps hold by friction alone.
         variant: `plain`, or `cluttered` with obstacles across most straight lines.
         perturbation: What varies in the pictures.
-        objects: Which mugs there are (`mugs.Mugs`).
+        objects: Which mugs there are: the same one, or those of `mugs.RANGES`.
 
     Raises:
         ValueError: There is no such variant.
@@ -43,10 +43,9 @@ class MugTask(Tabletop):
         friction: float = 1.0,
         variant: scene.Variant = "plain",
         perturbation: Perturbation = NOMINAL,
-        objects: mugs.Mugs = "one",
+        objects: str = ONE,
     ) -> None:
         self.variant: scene.Variant = variant
-        self.objects: mugs.Mugs = objects
         self._friction = friction
         super().__init__(
             full_name("mug", variant),
@@ -60,7 +59,7 @@ class MugTask(Tabletop):
             (scene.IMAGE_HEIGHT, scene.IMAGE_WIDTH),
             perturbation,
             partial(scene.look, variant=variant),
-            shaped=objects != "one",
+            objects,
         )
         self.shapes = [MugShape()] * batch
         """The lanes' mugs. Privileged."""
@@ -79,7 +78,7 @@ class MugTask(Tabletop):
         The result depends on the seed alone, bit for bit. Nothing asks whether the pose is easy.
         """
         for lane, seed in zip(lanes, seeds, strict=True):
-            if self.objects != "one":
+            if self.objects != ONE:
                 self._take(lane, mugs.mug_of(self.objects, seed))
             pose = np.eye(4)
             pose[:3, 3], pose[:3, :3] = poses.sample_pose(seed, self.shapes[lane])
