@@ -31,7 +31,7 @@ class Args(Checked):
     batch: Count = 32
     task: str = tasks.DEFAULT
     variant: str = "plain"
-    objects: str = "one"
+    objects: str = tasks.ONE
     """Which mugs: one, train, held_out."""
 
 

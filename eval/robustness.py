@@ -36,7 +36,7 @@ class Setting(NamedTuple):
     """What is otherwise than in the weights' plainest demonstrations."""
 
     perturbation: Perturbation = NOMINAL
-    objects: str = "one"
+    objects: str = tasks.ONE
 
 
 MILD = Perturbation(yaw=5, pitch=5, translation=0.01)
@@ -154,7 +154,7 @@ class Loops:
 
     def __call__(self, setting: Setting) -> ClosedLoop:
         """The loop, which varies what the setting says."""
-        drawn = setting.objects != "one"
+        drawn = setting.objects != tasks.ONE
         if drawn not in self._loops:
             config = replace(self._config, objects=setting.objects)
             self._loops[drawn] = ClosedLoop(self._weights, config)

@@ -39,7 +39,7 @@ class Args(Checked):
     """Processes, each making one shard at a time. The bytes do not depend on it."""
     perturbation: Perturbation = NOMINAL
     """What varies in the pictures."""
-    objects: str = "one"
+    objects: str = tasks.ONE
     """Which objects the episodes have: one, train, held_out."""
     demonstration: DemonstrationConfig = DemonstrationConfig()
 

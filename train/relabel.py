@@ -37,7 +37,7 @@ class Args(Checked):
     variant: str = "plain"
     perturbation: Perturbation = NOMINAL
     """What varies in the pictures."""
-    objects: str = "one"
+    objects: str = tasks.ONE
     """Which objects the episodes have: one, train, held_out."""
 
 

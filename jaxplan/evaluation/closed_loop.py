@@ -49,7 +49,7 @@ class ClosedLoopConfig(Checked):
     """Factor on all friction; 0 shows that grasps hold by friction alone."""
     perturbation: Perturbation = NOMINAL
     """What varies in the pictures."""
-    objects: str = "one"
+    objects: str = tasks.ONE
     """Which objects the episodes have: one, train, held_out."""
     prediction_noise: NotNegative = 0.0
     """Standard deviation of noise on each joint of what the upper network says [rad]."""

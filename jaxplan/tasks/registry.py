@@ -1,11 +1,11 @@
 """The tasks by name: `load("mug", batch=32, variant="cluttered")`."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import NamedTuple, get_args
 
 from jaxplan import ranges
 from jaxplan.robots import PANDA
-from jaxplan.tasks.mug.mugs import RANGES
+from jaxplan.tasks.mug.mugs import RANGES, described
 from jaxplan.tasks.mug.poses import STARTS
 from jaxplan.tasks.mug.scene import Variant
 from jaxplan.tasks.mug.task import MugTask
@@ -25,13 +25,17 @@ class TaskEntry(NamedTuple):
     """Whose arm it is for."""
     starts: Starts | None = None
     """What is drawn at random at the start of an episode."""
-    objects: tuple[str, ...] = (ONE,)
-    """Which objects its episodes may have."""
+    objects: Mapping[str, Mapping[str, str]] = {ONE: {}}
+    """Which objects its episodes may have: by name what is drawn, for cards of data sets."""
 
 
 TASKS = {
     "mug": TaskEntry(
-        MugTask, get_args(Variant), PANDA.name, STARTS, objects=(ONE, *RANGES)
+        MugTask,
+        get_args(Variant),
+        PANDA.name,
+        STARTS,
+        {ONE: {}} | {name: described(name) for name in RANGES},
     )
 }
 
