@@ -30,7 +30,7 @@ class MugRange(NamedTuple):
     """From its upper end to its lower one [m]: pads are 17 mm high and must not touch both of
     the arms that it hangs on, or contacts are as many as make the solver fling the mug."""
     mass: Spans
-    """[kg]. From 0.32 on, fingers cannot carry a wide mug by its handle."""
+    """[kg]. From 0.26 on, the widest mugs slip between fingers that hold their handle."""
     hue: Spans
     """Of the colour, 0 to 1 around the circle from red to red."""
     saturation: Spans = ((0.35, 0.9),)
@@ -51,7 +51,7 @@ RANGES = {
         height=((0.076, 0.080), (0.110, 0.116)),
         handle_depth=((0.028, 0.031), (0.039, 0.042)),
         handle_length=((0.038, 0.042), (0.052, 0.056)),
-        mass=((0.09, 0.12), (0.26, 0.29)),
+        mass=((0.09, 0.12),),
         hue=((0.80, 0.93),),
     ),
 }
