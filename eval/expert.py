@@ -31,12 +31,15 @@ class Args(Checked):
     batch: Count = 32
     task: str = tasks.DEFAULT
     variant: str = "plain"
+    objects: str = tasks.ONE
+    """Which mugs: one, train, held_out."""
 
 
 def main(args: Args) -> None:
     """Runs, prints, writes JSON."""
     seeds = parse_seeds(args.seeds)
-    task = tasks.load(args.task, min(args.batch, len(seeds)), args.variant)
+    batch = min(args.batch, len(seeds))
+    task = tasks.load(args.task, batch, args.variant, objects=args.objects)
     expert = ExpertAgent(task, CLEAN)
     certification = Certification(expert.planner, task.planning_scene)
     records = []
@@ -52,6 +55,7 @@ def main(args: Args) -> None:
         "planning": certification.summary(),
         "episodes": [record.as_json() for record in records],
         "variant": args.variant,
+        "objects": args.objects,
     }
     write_result(args.out, result)
     print(f"expert: {successes}/{len(records)} episodes")

@@ -209,6 +209,7 @@ def _read(config: TrainConfig) -> tuple[data.Shard, dict[str, Any]]:
         f"{kind}s": sorted({each[kind] for each in settings if kind in each})
         for kind in ("task", "camera", "robot")
     }
+    shown["objects"] = sorted({each.get("objects", "one") for each in settings})
     return shard, {"data": hashes, **shown}
 
 

@@ -30,4 +30,5 @@ def random_world(scene: Scene, rng: np.random.Generator, rows: int) -> World:
     ignored[held] |= scene.ignored([*FINGERS, "hand|mug"])
     world = make_world(scene, pose, held[:, None], passive)._replace(ignored=ignored)
     slots = (np.zeros((rows, 0, n)) for n in (7, 3))
-    return World(*world[:4], *slots)  # every leaf with the rows in front
+    geoms = (np.broadcast_to(leaf, (rows, *leaf.shape)) for leaf in world[6:])
+    return World(*world[:4], *slots, *geoms)  # every leaf with the rows in front

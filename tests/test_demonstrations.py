@@ -34,7 +34,7 @@ def test_same_seeds_give_the_same_bytes(shard, demonstration, demonstrate, tmp_p
 def test_labels_are_clean_keyframes(shard, demonstration, mug_task):
     """Also in episodes that were driven with noise: the expert's own, from the settled mug."""
     mug_task.reset(range(4), demonstration.seeds)
-    expert = Expert(mug_task.model)
+    expert = Expert(mug_task.kinematics)
     for e, seed in enumerate(demonstration.seeds):
         keyframes = expert.keyframes(
             mug_task.object_pose(e), PANDA.q_home, closed=False

@@ -70,9 +70,10 @@ def test_files_stand_side_by_side_in_the_summary():
 def test_the_paper_s_settings_are_there():
     assert {*PAPER} <= {*SETTINGS}
     assert all({*aims} <= {*SETTINGS} for aims in AIMS.values())
-    assert SETTINGS["nominal"].nothing
-    assert not any(SETTINGS[name].nothing for name in SETTINGS if name != "nominal")
-    assert SETTINGS["mild, each query"].each_query
+    plain = [name for name in SETTINGS if SETTINGS[name].perturbation.nothing]
+    assert plain == ["nominal", "mugs", "mugs held out"]
+    assert [SETTINGS[name].objects for name in plain] == ["one", "train", "held_out"]
+    assert SETTINGS["mild, each query"].perturbation.each_query
 
 
 @pytest.mark.parametrize(

@@ -33,7 +33,7 @@ def build(ours, other):
 
 
 class Pick(tasks.Tabletop):
-    def __init__(self, batch, variant, camera, friction, perturbation):
+    def __init__(self, batch, variant, camera, friction, perturbation, objects):
         models = build(PHYSICS, PLANNING), build(PLANNING, PHYSICS)
         allowed = {
             (how, at): ALLOWED for how in ("free", "held") for at in (False, True)

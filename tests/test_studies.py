@@ -45,6 +45,8 @@ def some_problems(seeds=(7, 7, 9)) -> RecordedProblems:
         "object_pose": (1, 7),
         "slot_pose": (0, 7),
         "slot_size": (0, 3),
+        "geom_pos": (0, 3),
+        "geom_size": (0, 3),
         "passive": (2,),
         "held": (1,),
         "ignored": (5,),

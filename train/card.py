@@ -13,7 +13,7 @@ import numpy as np
 
 from jaxplan import data
 from jaxplan.data import TOGGLES, Shard, read_manifest, write_atomic
-from jaxplan.tasks import TASKS
+from jaxplan.tasks import ONE, TASKS
 from jaxplan.tasks.starts import Starts
 
 BINS = 3
@@ -36,8 +36,10 @@ def describe(shard: Shard, settings: dict[str, Any]) -> dict[str, Any]:
     """What the shards of a collection hold, JSON-ready."""
     success = shard.episode_success
     failures = Counter(str(f) for f in shard.episode_failure[~success])
-    starts = TASKS[settings["task"].split("_")[0]].starts
+    entry = TASKS[settings["task"].split("_")[0]]
+    starts = entry.starts
     randomised = starts.described() if starts else {}
+    randomised |= entry.objects[settings.get("objects", ONE)]
     noisy = settings["demonstration"]["noisy_episodes"]
     randomised["share of episodes driven beside their labels"] = noisy
     return {

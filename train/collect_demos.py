@@ -39,6 +39,8 @@ class Args(Checked):
     """Processes, each making one shard at a time. The bytes do not depend on it."""
     perturbation: Perturbation = NOMINAL
     """What varies in the pictures."""
+    objects: str = tasks.ONE
+    """Which objects the episodes have: one, train, held_out."""
     demonstration: DemonstrationConfig = DemonstrationConfig()
 
 
@@ -53,6 +55,7 @@ class Collector:
             args.variant,
             args.camera,
             perturbation=args.perturbation,
+            objects=args.objects,
         )
         self._expert = ExpertAgent(self._task, args.demonstration)
 
@@ -86,12 +89,13 @@ def main(args: Args) -> None:
     if not 0 <= args.first_seed <= 2**31 - count * args.shard_size:
         raise ValueError(f"first_seed {args.first_seed}: seeds are 0 to {2**31 - 1}")
     settings = {
-        "task": tasks.check(args.task, args.variant),
+        "task": tasks.check(args.task, args.variant, args.objects),
         "robot": tasks.TASKS[args.task].robot,
         "first_seed": args.first_seed,
         "shard_size": args.shard_size,
         "camera": args.camera,
         "perturbation": dataclasses.asdict(args.perturbation),
+        "objects": args.objects,
         "demonstration": dataclasses.asdict(args.demonstration),
     }
     args.out.mkdir(parents=True, exist_ok=True)

@@ -37,11 +37,14 @@ class Args(Checked):
     variant: str = "plain"
     perturbation: Perturbation = NOMINAL
     """What varies in the pictures."""
+    objects: str = tasks.ONE
+    """Which objects the episodes have: one, train, held_out."""
 
 
 def main(args: Args) -> None:
     """Collects what is missing."""
-    name, robot = tasks.check(args.task, args.variant), tasks.TASKS[args.task].robot
+    name = tasks.check(args.task, args.variant, args.objects)
+    robot = tasks.TASKS[args.task].robot
     weights = load_pair(args.weights or shipped(args.variant))
     for network in weights:
         network.check_fits(name, args.camera, robot)
@@ -62,6 +65,7 @@ def main(args: Args) -> None:
         args.variant,
         args.camera,
         perturbation=args.perturbation,
+        objects=args.objects,
     )
     planner = MotionPlanner(task.planning_scene, task.robot.limits)
     agent = Algorithm1(task, planner, *learned(task, weights))

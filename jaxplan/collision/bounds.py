@@ -151,4 +151,4 @@ def _anywhere(
     travel = jnp.stack(jnp.broadcast_arrays(twist, path, turn), 1)
     if any(way.held for way in ways.ways):
         travel = jnp.where(ways.so(world)[:, None, None], travel, 0)
-    return travel, extents(scene, ways, poses)
+    return travel, extents(scene, world, ways, poses)

@@ -30,8 +30,9 @@ def checked(scene: Scene, world: World, **q: Any) -> tuple[Any, ...]:
     if not isinstance(world, World):
         raise ValueError(f"world {shown(world)} is not a World, see make_world")
     objects, slots = len(scene.objects), len(scene.slots)
-    groups, passive = len(scene.groups), len(scene.passive)
+    groups, passive, shaped = len(scene.groups), len(scene.passive), len(scene.shaped)
     own = (objects, 7), (objects,), (passive,), (groups,), (slots, 7), (slots, 3)
+    own = *own, (shaped, 3), (shaped, 3)
     leaves = [
         _array(f"world.{name}", leaf, shape)
         for name, leaf, shape in zip(World._fields, world, own, strict=True)

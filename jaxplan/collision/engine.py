@@ -78,7 +78,7 @@ def least_scores(
     def shapes(ids: tuple[int, ...], world: World) -> Shapes:
         if ids[0] in slots:
             return _in_slots(world, [slots[geom] for geom in ids])
-        return read(scene, ids)
+        return read(scene, ids, world)
 
     def scores(front: Front, poses: jax.Array, world: World, score: Score) -> jax.Array:
         own = in_world(shapes(front.facing, world), poses, np.array(front.links))
@@ -154,7 +154,8 @@ def least_scores(
         width = max(leaf.shape[-1] for leaf in world)
         anywhere = jnp.zeros((len(q), width), q.dtype)
         ways = find_ways(scene)
-        extent = extents(scene, ways, link_poses(scene, world, anywhere))
+        poses = link_poses(scene, world, anywhere)
+        extent = extents(scene, world, ways, poses)
     return _in_blocks(block, q, world, motion, extent)
 
 

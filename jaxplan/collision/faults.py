@@ -51,10 +51,13 @@ def of_scene(scene: Scene) -> str:
 def of_world(scene: Scene, world: World) -> str:
     """What is wrong with a world, as `one_world` returns it."""
     slots = [scene.geom_name(slot.geom) for slot in scene.slots]
+    shaped = [scene.geom_name(geom) for geom in scene.shaped]
+    sizes = (slots, world.slot_size), (shaped, world.geom_size)
     poses = (scene.objects, world.object_pose), (slots, world.slot_pose)
     for names, rows in (
         *poses,
-        (slots, world.slot_size),
+        *sizes,
+        (shaped, world.geom_pos),
         (scene.passive, world.passive[:, None]),
     ):
         for name, row in zip(names, rows, strict=True):
@@ -64,9 +67,10 @@ def of_world(scene: Scene, world: World) -> str:
         for name, row in zip(names, rows, strict=True):
             if not row[3:].any():
                 return f"{name!r} has a quaternion of zeros"
-    for name, row in zip(slots, world.slot_size, strict=True):
-        if (row < 0).any():
-            return f"{name!r} has a negative size: {row.tolist()}"
+    for names, rows in sizes:
+        for name, row in zip(names, rows, strict=True):
+            if (row < 0).any():
+                return f"{name!r} has a negative size: {row.tolist()}"
     for name, held in zip(scene.objects, world.held, strict=True):
         if held and name in scene.mocap:
             return f"{name!r} is held, which a mocap body cannot be"

@@ -30,8 +30,10 @@ def least_distances(
     Returns:
         `[N]` [m].
     """
-    if scene.slots or scene.mocap:
-        raise ValueError("backend 'mjx' has no slots or mocap bodies; use 'fast'")
+    if scene.slots or scene.mocap or scene.shaped:
+        raise ValueError(
+            "backend 'mjx' has no slots, mocap bodies or shaped objects; use 'fast'"
+        )
     if not scene.groups:
         return jnp.full(q.shape[-1], jnp.inf)
     model = mjx.put_model(scene.mj_model).replace(**scene.model._asdict())

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from jaxplan.collision.checks import checked
 from jaxplan.collision.positions import carry, free_objects, qpos_rows
-from jaxplan.collision.replica import fill_slots, look_within, mujoco_model
+from jaxplan.collision.replica import fill, look_within, mujoco_model
 from jaxplan.collision.world import OWN_AXES, World, batch_shape
 from jaxplan.ranges import NotNegative, check
 from jaxplan.scene import Scene
@@ -113,18 +113,19 @@ class Replica:
                 counts[:, index] &= worlds.held[:, list(group.held)].any(-1)
         self.counts, self._carries = counts, worlds.held.any(-1)
         # Filling slots takes as long as the rest, and mostly they stay as they are.
-        slots = np.concatenate([worlds.slot_pose, worlds.slot_size], -1)
+        given = worlds.slot_pose, worlds.slot_size, worlds.geom_pos, worlds.geom_size
+        own = np.concatenate([np.reshape(x, (len(rows), -1)) for x in given], 1)
         self._fills = np.ones(len(rows), bool)
         if len(rows) > 1:
-            self._fills[1:] = (slots[1:] != slots[:-1]).any((1, 2))
+            self._fills[1:] = (own[1:] != own[:-1]).any(1)
         self._row = -2
 
     def pose(self, row: int) -> None:
         """Puts geoms where they are in one of the configurations."""
         scene, model, data, worlds = self._scene, self.model, self.data, self._worlds
-        if scene.slots and (self._fills[row] or row != self._row + 1):
-            pose, size = worlds.slot_pose[row], worlds.slot_size[row]
-            fill_slots(scene, model, np.asarray(pose), np.asarray(size))
+        changes = bool(scene.slots or scene.shaped)
+        if changes and (self._fills[row] or row != self._row + 1):
+            fill(scene, model, World(*(leaf[row] for leaf in worlds)))
         self._row = row
         data.qpos[:] = self._qpos[row]
         if scene.mocap:

@@ -207,7 +207,8 @@ def _flatten(
         finite &= jnp.isfinite(pose).all((-2, -1))
         finite &= (pose[..., 3:] != 0).any(-1).all(-1)  # a rotation
     finite &= jnp.isfinite(world.passive).all(-1)
-    finite &= jnp.isfinite(world.slot_size).all((-2, -1))
+    for rows in (world.slot_size, world.geom_pos, world.geom_size):
+        finite &= jnp.isfinite(rows).all((-2, -1))
     leaves = zip(world, OWN_AXES, strict=True)
     flat = World(*(_batch_last(leaf, shape, own) for leaf, own in leaves))
     rows = [

@@ -147,11 +147,12 @@ def _line(scene: Scene, moves: np.ndarray, row: int) -> tuple[tuple[int, ...], i
     return tuple(rows), thing
 
 
-def extents(scene: Scene, ways: Ways, poses: jax.Array) -> Extent:
+def extents(scene: Scene, world: World, ways: Ways, poses: jax.Array) -> Extent:
     """Of all geoms by id; of those that the arm never moves 0.
 
     Args:
         scene: The scene.
+        world: Leaves with the batch last.
         ways: `find_ways`.
         poses: `[1 + n_links, 3, 4, B]` of the links, wherever the arm is.
     """
@@ -170,7 +171,7 @@ def extents(scene: Scene, ways: Ways, poses: jax.Array) -> Extent:
     across = beyond = jnp.zeros((model.ngeom, poses.shape[-1]), poses.dtype)
     for kind, geoms in kinds.items():
         ids = np.array([*geoms])
-        own, bodies = read(scene, tuple(geoms)), model.geom_bodyid[ids]
+        own, bodies = read(scene, tuple(geoms), world), model.geom_bodyid[ids]
         placed = in_world(own, poses, np.array([links[int(body)] for body in bodies]))
         rows = np.array([first[int(body)] for body in bodies])
         offset = minus(placed.centre, coordinates(anchor[rows]))

@@ -5,6 +5,7 @@ import copy
 import mujoco
 import numpy as np
 
+from jaxplan.collision.world import World
 from jaxplan.scene import Scene
 from jaxplan.scene.contacts import KINDS
 
@@ -35,14 +36,14 @@ def look_within(model: mujoco.MjModel, reach: float) -> None:
     model.body_margin[:] = model.pair_margin[:] = reach
 
 
-def fill_slots(
-    scene: Scene, model: mujoco.MjModel, pose: np.ndarray, size: np.ndarray
-) -> None:
-    """Puts obstacles `pose [n_slots, 7]`, `size [n_slots, 3]` into the model's slots."""
-    geoms = [slot.geom for slot in scene.slots]
-    model.geom_pos[geoms], model.geom_size[geoms] = pose[:, :3], size
+def fill(scene: Scene, model: mujoco.MjModel, world: World) -> None:
+    """Puts a world's obstacles into the model's slots, and gives shaped objects its shape."""
+    geoms, pose = [slot.geom for slot in scene.slots], np.asarray(world.slot_pose)
+    model.geom_pos[geoms], model.geom_size[geoms] = pose[:, :3], world.slot_size
     norm = np.linalg.norm(pose[:, 3:], axis=-1, keepdims=True)
     model.geom_quat[geoms] = pose[:, 3:] / norm
+    shaped = list(scene.shaped)
+    model.geom_pos[shaped], model.geom_size[shaped] = world.geom_pos, world.geom_size
     _bound(model)
 
 

@@ -15,6 +15,7 @@ import numpy as np
 
 from jaxplan.collision.hulls import Hulls, read_hulls
 from jaxplan.collision.kinematics import rotation_of
+from jaxplan.collision.world import World
 from jaxplan.scene import Scene
 
 Vector = list[jax.Array]
@@ -70,16 +71,37 @@ class Shapes(NamedTuple):
     """Of meshes."""
 
 
-def read(scene: Scene, ids: tuple[int, ...]) -> Shapes:
-    """Geoms in the frames of their bodies."""
+def read(scene: Scene, ids: tuple[int, ...], world: World | None = None) -> Shapes:
+    """Geoms in the frames of their bodies.
+
+    Args:
+        scene: The scene.
+        ids: Of the geoms.
+        world: Leaves with the batch last; without it, shaped geoms are the model's.
+    """
     model, rows = scene.model, np.array(ids)
     rotation = rotation_of(model.geom_quat[rows].T)[..., None]
     mesh = scene.mj_model.geom_type[ids[0]] == mujoco.mjtGeom.mjGEOM_MESH
-    return Shapes(
+    shapes = Shapes(
         list(model.geom_pos[rows].T[..., None]),
         [list(rotation[:, k]) for k in range(3)],
         list(model.geom_size[rows].T[..., None]),
         read_hulls(scene.mj_model, ids) if mesh else None,
+    )
+    own = {geom: row for row, geom in enumerate(scene.shaped)}
+    if world is None or not own.keys() & set(ids):
+        return shapes
+    # Of both, the model's and the world's, one gather takes each geom's.
+    order = np.array([own.get(g, len(own) + i) for i, g in enumerate(ids)])
+
+    def chosen(fixed: jax.Array, given: jax.Array) -> jax.Array:
+        wide = jnp.broadcast_to(fixed, (len(ids), given.shape[-1]))
+        return jnp.concatenate([given, wide])[order]
+
+    pos, size = (jnp.moveaxis(leaf, 1, 0) for leaf in (world.geom_pos, world.geom_size))
+    return shapes._replace(
+        centre=[*map(chosen, shapes.centre, pos)],
+        size=[*map(chosen, shapes.size, size)],
     )
 
 

@@ -13,7 +13,7 @@ from jaxplan.collision.obstacles import Obstacle, fill
 from jaxplan.process import refuse_fork
 from jaxplan.ranges import check
 from jaxplan.scene import Scene
-from jaxplan.scene.names import known
+from jaxplan.scene.names import known, shortened
 from jaxplan.scene.numbers import rotations
 
 
@@ -37,13 +37,18 @@ class World(NamedTuple):
     """`[..., n_slots, 7]` of the obstacles in the scene's slots."""
     slot_size: jax.Array
     """`[..., n_slots, 3]` their sizes as MuJoCo's [m]."""
+    geom_pos: jax.Array
+    """`[..., n_shaped, 3]` where the geoms of shaped objects are (`Scene.shaped`), in the
+    frames of their bodies [m]."""
+    geom_size: jax.Array
+    """`[..., n_shaped, 3]` their sizes as MuJoCo's [m]."""
 
     def __reduce__(self) -> tuple[Any, ...]:
         """A copy is in NumPy: so it can be read without JAX."""
         return World, tuple(map(np.asarray, self))
 
 
-OWN_AXES = (2, 1, 1, 1, 2, 2)
+OWN_AXES = (2, 1, 1, 1, 2, 2, 2, 2)
 """How many of each leaf's axes are not batch axes."""
 
 
@@ -54,6 +59,8 @@ def make_world(
     passive: npt.ArrayLike | None = None,
     ignored: Iterable[str | tuple[str, str]] = (),
     obstacles: Iterable[Obstacle] = (),
+    geom_pos: npt.ArrayLike | None = None,
+    geom_size: npt.ArrayLike | None = None,
 ) -> World:
     """A world; what is not given is as in the model's reference pose.
 
@@ -64,6 +71,8 @@ def make_world(
         passive: `[..., n_passive]` [rad or m].
         ignored: Pairs of bodies that may touch, "hand|cup" or ("hand", "cup").
         obstacles: What fills the scene's slots, at most as many of a kind as there are.
+        geom_pos: `[..., n_shaped, 3]` [m], see `World`.
+        geom_size: `[..., n_shaped, 3]` [m].
 
     Raises:
         ValueError: There is no slot of that kind left, or no such pair; an obstacle makes
@@ -79,12 +88,19 @@ def make_world(
         held = np.zeros(len(scene.objects), bool)
     if passive is None:
         passive = scene.mj_model.qpos0[scene.addresses(scene.passive)]
+    rows = np.array(scene.shaped, int)
+    if geom_pos is None:
+        geom_pos = np.asarray(scene.model.geom_pos)[rows]
+    if geom_size is None:
+        geom_size = np.asarray(scene.model.geom_size)[rows]
     world = World(
         jnp.asarray(object_pose, jnp.float32),
         jnp.asarray(held, bool),
         jnp.asarray(passive, jnp.float32),
         jnp.asarray(scene.ignored(ignored)),
         *fill(scene, obstacles),
+        jnp.asarray(geom_pos, jnp.float32),
+        jnp.asarray(geom_size, jnp.float32),
     )
     _refuse_shapes(scene, world)
     if not isinstance(world.held, Tracer):
@@ -139,10 +155,13 @@ def world_at_key(scene: Scene, key: str | int) -> World:
 
 def _refuse_shapes(scene: Scene, world: World) -> None:
     """Names an array that does not fit the scene, and what its rows are for."""
+    shaped = [scene.geom_name(geom) for geom in scene.shaped]
     expected = (
         ("object_pose", world.object_pose, scene.objects, (7,)),
         ("held", world.held, scene.objects, ()),
         ("passive", world.passive, scene.passive, ()),
+        ("geom_pos", world.geom_pos, shaped, (3,)),
+        ("geom_size", world.geom_size, shaped, (3,)),
     )
     for field, leaf, names, row in expected:
         own = (len(names), *row)
@@ -150,7 +169,7 @@ def _refuse_shapes(scene: Scene, world: World) -> None:
             wanted = ", ".join(map(str, ("...", *own)))
             raise ValueError(
                 f"{field} has shape {leaf.shape}, expected [{wanted}] for "
-                f"{', '.join(names) or 'nothing'}"
+                f"{shortened(names) if names else 'nothing'}"
             )
 
 

@@ -49,6 +49,8 @@ class ClosedLoopConfig(Checked):
     """Factor on all friction; 0 shows that grasps hold by friction alone."""
     perturbation: Perturbation = NOMINAL
     """What varies in the pictures."""
+    objects: str = tasks.ONE
+    """Which objects the episodes have: one, train, held_out."""
     prediction_noise: NotNegative = 0.0
     """Standard deviation of noise on each joint of what the upper network says [rad]."""
 
@@ -79,6 +81,7 @@ class ClosedLoop:
             config.camera,
             config.friction,
             config.perturbation,
+            config.objects,
         )
         self.learned = learned(self.task, weights, config.inference_steps)
         self.planner = MotionPlanner(
@@ -90,10 +93,23 @@ class ClosedLoop:
         # One phase of one episode compiles all, so that no planning time includes it.
         self._episodes([0], EpisodeConfig(max_phases=1))
 
-    def perturb(self, perturbation: Perturbation) -> None:
-        """Lets other things vary in the pictures from now on; nothing compiles anew."""
-        self.config = dataclasses.replace(self.config, perturbation=perturbation)
+    def perturb(self, perturbation: Perturbation, objects: str | None = None) -> None:
+        """Lets other things vary from now on; nothing compiles anew.
+
+        Args:
+            perturbation: In the pictures.
+            objects: The episodes'; as before where None.
+
+        Raises:
+            ValueError: One object for all where the loop began with drawn ones, or the
+                other way round.
+        """
+        objects = objects or self.config.objects
+        self.task.draw(objects)
         self.task.eyes.perturbation = perturbation
+        self.config = dataclasses.replace(
+            self.config, perturbation=perturbation, objects=objects
+        )
 
     def run(
         self,

@@ -63,6 +63,8 @@ class RecordedProblems(NamedTuple):
     ignored: np.ndarray
     slot_pose: np.ndarray
     slot_size: np.ndarray
+    geom_pos: np.ndarray
+    geom_size: np.ndarray
 
     @property
     def worlds(self) -> World:

@@ -166,8 +166,9 @@ def world_of(world: World, ours: World, batch: tuple[int, ...]) -> World:
             raise ValueError(
                 f"world.{name} has shape {leaves[-1].shape}, expected {wanted}"
             )
-    if (leaves[-1] < 0).any():
-        raise ValueError("world.slot_size has a negative size")
+    for name, leaf in zip(World._fields, leaves, strict=True):
+        if name in ("slot_size", "geom_size") and (leaf < 0).any():
+            raise ValueError(f"world.{name} has a negative size")
     if all(leaf.shape == own.shape for leaf, own in zip(leaves, ours, strict=True)):
         return World(*leaves)
     shapes = [(*batch, *own.shape) for own in ours]

@@ -5,7 +5,8 @@ and every query answers for the new scene without recompiling. Structure (which 
 joints and pairs there are) is static and read once.
 
 Obstacles that come and go between queries live in slots: geoms of a body `obstacles` whose
-poses and sizes are in the `World`.
+poses and sizes are in the `World`. Objects whose shape differs from query to query are
+`shaped`: where their geoms are on them, and how large, is in the `World` too.
 """
 
 import copy
@@ -58,6 +59,7 @@ class Scene:
         hand: str | None = None,
         slots: Mapping[str, int] | None = None,
         exclude: Exclude = ALWAYS,
+        shaped: Sequence[str] = (),
     ) -> "Scene":
         """Reads a scene.
 
@@ -79,6 +81,9 @@ class Scene:
                 geoms that overlap wherever the arm is (neighbouring links, often; never
                 objects and slots); pairs of bodies, ("hand", "cup") or "hand|cup"; a list
                 of both; or None. `excluded` says which.
+            shaped: Objects whose shape differs from query to query: `World.geom_pos` and
+                `World.geom_size` give the places and sizes of their geoms, of which there
+                are always the same, turned the same way.
 
         Raises:
             FileNotFoundError: There is no such file.
@@ -86,14 +91,15 @@ class Scene:
                 joint or body is not in it, or cannot be planned for; `joints` is None
                 and several chains are longest; a geom that can touch the arm is a height
                 field, a flex or an SDF; the arm's joints are tied by a loop or a tendon,
-                or leave no values to joints that follow them.
+                or leave no values to joints that follow them; what is shaped is no object,
+                or has a mesh that can touch something.
         """
         refuse_fork()
         check_arguments(source, joints, hand, slots)
         slots = slots or {}
         model = compile_model(source, slots)
         names = SLOTS if any(slots.values()) else None
-        structure = read_structure(model, joints, hand, names, exclude)
+        structure = read_structure(model, joints, hand, names, exclude, shaped)
         numbers = read_numbers(model)
         arm_limits(structure, numbers)  # raises where a joint has no room
         return cls(numbers, structure)
@@ -145,7 +151,9 @@ class Scene:
             for name in changed:
                 getattr(model, name)[:] = np.asarray(fields[name])
             names = self.joints, self.hand, SLOTS if self.slots else None
-            structure = read_structure(model, *names, structure.excludes)
+            structure = read_structure(
+                model, *names, structure.excludes, structure.shaped_objects
+            )
         return Scene(self.model._replace(**fields), structure)
 
     @property
@@ -191,6 +199,11 @@ class Scene:
     def slots(self) -> tuple[Slot, ...]:
         """Room for obstacles: `World.slot_pose` and `World.slot_size` fill it."""
         return self.structure.slots
+
+    @property
+    def shaped(self) -> tuple[int, ...]:
+        """Geoms whose places and sizes `World.geom_pos` and `World.geom_size` give, by id."""
+        return self.structure.shaped
 
     @property
     def hand(self) -> str:

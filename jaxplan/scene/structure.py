@@ -20,8 +20,11 @@ from jaxplan.scene.dependent import Dependent, in_order, root_of
 from jaxplan.scene.excludes import Exclude, Excludes, find_excludes
 from jaxplan.scene.flexes import refuse_flexes
 from jaxplan.scene.loops import refuse_loops
-from jaxplan.scene.names import known, names_of
+from jaxplan.scene.names import geom_name, known, names_of
 from jaxplan.scene.touching import Moving, near_distances
+
+SHAPEABLE = ("sphere", "capsule", "cylinder", "ellipsoid", "box")
+"""Kinds of geoms whose sizes say all of their shape."""
 
 
 class Link(NamedTuple):
@@ -83,6 +86,8 @@ class Structure:
     """The last of the objects: those without a free joint."""
     hand: str
     slots: tuple[Slot, ...]
+    shaped: tuple[int, ...]
+    """Ids of the geoms whose places and sizes are given with each query."""
     groups: tuple[Group, ...]
     excludes: Excludes
     links: tuple[Link, ...]
@@ -91,6 +96,12 @@ class Structure:
     hand may hold, then what hangs on them."""
     link_of: dict[int, int]
     """Row of a body's frame, by body id."""
+
+    @property
+    def shaped_objects(self) -> tuple[str, ...]:
+        """Whose geoms they are."""
+        bodies = self.mj_model.geom_bodyid[list(self.shaped)]
+        return tuple(dict.fromkeys(self.body_names[body] for body in bodies))
 
     @cached_property
     def near(self) -> dict[tuple[int, int], float]:
@@ -110,6 +121,7 @@ def read_structure(
     hand: str | None,
     slots: str | None = None,
     exclude: Exclude | Excludes = None,
+    shaped: Sequence[str] = (),
 ) -> Structure:
     """Reads names, tree and contacts; `Scene.from_mjcf` says what None means.
 
@@ -119,6 +131,7 @@ def read_structure(
         hand: A body.
         slots: The body whose geoms are slots.
         exclude: Contacts to leave out, or what was found to be left out.
+        shaped: Objects whose geoms change between queries.
 
     Raises:
         ValueError: A joint or body is not in the model, or cannot be planned for.
@@ -171,6 +184,7 @@ def read_structure(
             for g, body in enumerate(model.geom_bodyid)
             if bodies[body] == slots
         ),
+        shaped=_shaped(model, bodies, [*free, *mocap], shaped, groups),
         groups=groups,
         excludes=exclude,
         links=links,
@@ -245,6 +259,32 @@ def _groups(
             name = "|".join(sorted(names[body] for body in pair))
             groups.append(Group(name, tuple(contacts), () if arm & apart else held))
     return tuple(groups)
+
+
+def _shaped(
+    model: mujoco.MjModel,
+    names: tuple[str, ...],
+    objects: list[int],
+    shaped: Sequence[str],
+    groups: tuple[Group, ...],
+) -> tuple[int, ...]:
+    """Geoms of shaped objects that can touch something.
+
+    Raises:
+        ValueError: An object is none, or one of its geoms is a mesh.
+    """
+    movable = [names[body] for body in objects]
+    bodies = {names.index(known(name, "movable object", movable)) for name in shaped}
+    sides = {s for group in groups for contact in group.contacts for s in contact}
+    own = [side for side in sides if side.body in bodies]
+    for side in own:
+        if side.kind not in SHAPEABLE:
+            name = geom_name(model, names, side.ids[0])
+            raise ValueError(
+                f"{name!r} is a {side.kind}, which has no size to be given: "
+                f"{', '.join(SHAPEABLE)} have"
+            )
+    return tuple(sorted({geom for side in own for geom in side.ids}))
 
 
 def _links(

@@ -7,6 +7,7 @@ import os
 import sys
 import weakref
 from collections.abc import Iterable
+from itertools import pairwise
 
 import mujoco
 import numpy as np
@@ -84,20 +85,36 @@ class Camera:
         options.geomgroup[:] = 0
         options.geomgroup[list(groups)] = 1
         self._options = options
+        self._uploaded = model.mesh_vert.copy(), model.tex_data.copy()
 
     def render(
         self, data: mujoco.MjData, camera: str | int | mujoco.MjvCamera
     ) -> np.ndarray:
-        """Image `[height, width, 3]` uint8 from a camera."""
+        """Image `[height, width, 3]` uint8 from a camera.
+
+        The data may be of another model than the last, with meshes and textures of the same
+        sizes.
+        """
+        self._show(data.model)
         self._renderer.update_scene(data, camera, self._options)
         return self._renderer.render()
 
-    def upload_texture(self, texture: int) -> None:
-        """Shows a texture of the model as its data are now."""
-        renderer = self._renderer
+    def _show(self, model: mujoco.MjModel) -> None:
+        """Draws a model from now on; meshes and textures that are others go to the GPU."""
+        renderer, (vertices, texels) = self._renderer, self._uploaded
+        renderer._model = model
         if renderer._gl_context:
             renderer._gl_context.make_current()
-        mujoco.mjr_uploadTexture(renderer.model, renderer._mjr_context, texture)
+        for old, new, starts, upload in (
+            (vertices, model.mesh_vert, model.mesh_vertadr, mujoco.mjr_uploadMesh),
+            (texels, model.tex_data, model.tex_adr, mujoco.mjr_uploadTexture),
+        ):
+            if np.array_equal(old, new):
+                continue
+            for i, (a, b) in enumerate(pairwise([*starts, len(new)])):
+                if not np.array_equal(old[a:b], new[a:b]):
+                    upload(model, renderer._mjr_context, i)
+            old[:] = new
 
     def project(self, points: np.ndarray) -> np.ndarray:
         """Where points `[N, 3]` [m] are in the image that was last rendered, `[N, 2]` [px].

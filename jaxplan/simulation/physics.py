@@ -13,7 +13,7 @@ CONTROL_PERIOD = 0.01
 
 
 class Simulator:
-    """A batch of independent physics episodes of one model, stepped on all cores.
+    """A batch of independent physics episodes, stepped on all cores.
 
     Each episode is an `MjData`; `map` steps some of them side by side, so that episodes which
     have ended cost nothing.
@@ -22,7 +22,7 @@ class Simulator:
     def __init__(
         self, robot: Robot, model: mujoco.MjModel, batch: int, threads: int = 2
     ) -> None:
-        self.model, self._gripper = model, robot.gripper
+        self._gripper = robot.gripper
         self._arm, self._fingers = robot.arm, robot.finger_slice
         self.data = [mujoco.MjData(model) for _ in range(batch)]
         self._steps = round(CONTROL_PERIOD / model.opt.timestep)
@@ -34,6 +34,10 @@ class Simulator:
         self._lag = -bias[:, 2] / gain[:, 0]
         self.record: Callable[[int, mujoco.MjData], None] | None = None
         """Called after each control period with (episode, data), from a worker thread."""
+
+    def give(self, episode: int, model: mujoco.MjModel) -> None:
+        """Puts another object of the same kind into an episode: a model with the same joints."""
+        self.data[episode] = mujoco.MjData(model)
 
     def q(self, episode: int) -> np.ndarray:
         """Arm joints of an episode, `[d]` [rad]."""
@@ -96,6 +100,7 @@ class Simulator:
         self.wait(episode, settle)
 
     def _advance(self, episode: int) -> None:
-        mujoco.mj_step(self.model, self.data[episode], self._steps)
+        data = self.data[episode]
+        mujoco.mj_step(data.model, data, self._steps)
         if self.record is not None:
-            self.record(episode, self.data[episode])
+            self.record(episode, data)

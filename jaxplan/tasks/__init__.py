@@ -6,4 +6,5 @@ from jaxplan.tasks.registry import TaskEntry as TaskEntry
 from jaxplan.tasks.registry import check as check
 from jaxplan.tasks.registry import load as load
 from jaxplan.tasks.registry import names as names
+from jaxplan.tasks.tabletop import ONE as ONE
 from jaxplan.tasks.tabletop import Tabletop as Tabletop

@@ -46,19 +46,16 @@ class Eyes:
         self.drawn: list[Drawn | None] = [None] * batch
         """What the last picture of each lane varied by: what a calibration should say."""
         self._model, self._make_look = model, look
-        self._camera: Camera | None = None
+        self._own: dict[int, Callable[[], mujoco.MjModel]] = {}
+        self._looks: dict[int, Look] = {}
+        """Of lanes that look like no other."""
         self._last: Camera | None = None
         self._seeds, self._queries = np.zeros((2, batch), int)
 
-    @cached_property
-    def _look(self) -> Look:
-        """Made for the first picture that is perturbed."""
-        model = copy.copy(self._make_look())
-        # The near plane and the shadows are in units of the model's size, which grows with
-        # what waits out of sight.
-        model.stat.extent = self._model.stat.extent
-        model.stat.center[:] = self._model.stat.center
-        return Look(model, self.name, self.image, REACH)
+    def give(self, lane: int, look: Callable[[], mujoco.MjModel]) -> None:
+        """A lane has a look of its own from now on, with the same joints."""
+        self._own[lane] = look
+        self._looks.pop(lane, None)
 
     def begin(self, lane: int, seed: int) -> None:
         """An episode begins."""
@@ -68,16 +65,14 @@ class Eyes:
         """`[H, W, 3]` uint8 of a lane's state."""
         if self.perturbation.nothing:
             self.drawn[lane] = None
-            if self._camera is None:
-                self._camera = Camera(self._model, *self.image)
-            self._last = self._camera
-            return self._camera.render(data, self.name)
+            self._last = self._plain
+            return self._last.render(data, self.name)
         seed, query = int(self._seeds[lane]), int(self._queries[lane])
-        drawn = draw(self.perturbation, seed, query, self._look.materials)
+        look = self._look(lane)
+        drawn = draw(self.perturbation, seed, query, look.materials)
         self._queries[lane], self.drawn[lane] = query + 1, drawn
-        picture = self._look.picture(data.qpos, drawn)
-        self._last = self._look.camera
-        return picture
+        self._last = self._dressed
+        return look.picture(self._last, data.qpos, drawn)
 
     def error(self, lane: int) -> np.ndarray:
         """`[5]` how the camera was off its mount in a lane's last picture.
@@ -93,3 +88,32 @@ class Eyes:
         """Where points `[N, 3]` [m] are in the picture that was taken last, `[N, 2]` [px]."""
         assert self._last is not None, "no picture was taken yet"
         return self._last.project(points)
+
+    @cached_property
+    def _plain(self) -> Camera:
+        return Camera(self._model, *self.image)
+
+    @cached_property
+    def _dressed(self) -> Camera:
+        """Takes the pictures that are perturbed, of whatever lane."""
+        return Camera(self._shared.given, *self.image)
+
+    @cached_property
+    def _shared(self) -> Look:
+        """Of all lanes that have none of their own."""
+        return self._made(self._make_look)
+
+    def _look(self, lane: int) -> Look:
+        if lane not in self._own:
+            return self._shared
+        if lane not in self._looks:
+            self._looks[lane] = self._made(self._own[lane])
+        return self._looks[lane]
+
+    def _made(self, make: Callable[[], mujoco.MjModel]) -> Look:
+        model = copy.copy(make())
+        # The near plane and the shadows are in units of the model's size, which grows with
+        # what waits out of sight.
+        model.stat.extent = self._model.stat.extent
+        model.stat.center[:] = self._model.stat.center
+        return Look(model, self.name, REACH)

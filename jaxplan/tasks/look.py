@@ -17,27 +17,19 @@ DIM = 0.02
 
 
 class Look:
-    """A camera's pictures.
+    """What a camera takes pictures of.
 
     Args:
         model: How the task looks.
         camera: By name.
-        image: Rows and columns [px].
         reach: `[2, 2]` least and greatest x and y of where a distractor may lie [m].
     """
 
-    def __init__(
-        self,
-        model: mujoco.MjModel,
-        camera: str,
-        image: tuple[int, int],
-        reach: np.ndarray,
-    ) -> None:
-        self._given, self._model = model, copy.copy(model)
+    def __init__(self, model: mujoco.MjModel, camera: str, reach: np.ndarray) -> None:
+        self.given, self._model = model, copy.copy(model)
         self._data = mujoco.MjData(self._model)
         self._eye = model.camera(camera).id
-        self._image, self._reach = image, reach
-        self.camera: Camera | None = None
+        self._reach = reach
         names = [model.mat(i).name for i in range(model.nmat)]
         tables = model.geom_matid == names.index("table") if "table" in names else []
         self._tables = np.flatnonzero(tables)
@@ -54,20 +46,18 @@ class Look:
         """How many there are."""
         return self._model.nmat
 
-    def picture(self, qpos: np.ndarray, drawn: Drawn) -> np.ndarray:
+    def picture(self, camera: Camera, qpos: np.ndarray, drawn: Drawn) -> np.ndarray:
         """`[H, W, 3]` uint8 of a state of the task's model."""
-        if self.camera is None:
-            self.camera = Camera(self._model, *self._image)
-        self._dress(self.camera, drawn)
+        self._dress(drawn)
         self._data.qpos[:] = qpos
         mujoco.mj_kinematics(self._model, self._data)
         mujoco.mj_comPos(self._model, self._data)
         mujoco.mj_camlight(self._model, self._data)
-        return with_noise(self.camera.render(self._data, self._eye), drawn)
+        return with_noise(camera.render(self._data, self._eye), drawn)
 
-    def _dress(self, camera: Camera, drawn: Drawn) -> None:
+    def _dress(self, drawn: Drawn) -> None:
         """Changes how the copy looks."""
-        given, model, eye = self._given, self._model, self._eye
+        given, model, eye = self.given, self._model, self._eye
         pose = turned(given.cam_quat[eye], given.cam_pos[eye], drawn)
         model.cam_quat[eye], model.cam_pos[eye] = pose
         self._light(drawn.light)
@@ -78,12 +68,12 @@ class Look:
             if drawn.colours[self._textured, 0] > 0:
                 model.geom_matid[self._tables] = self._textured
         if self._sky >= 0:
-            self._paint_sky(camera, drawn.colours[-1])
+            self._paint_sky(drawn.colours[-1])
         if self._distractor >= 0:
             self._place(drawn.distractor)
 
     def _light(self, light: np.ndarray) -> None:
-        given, model = self._given, self._model
+        given, model = self.given, self._model
         turn, axis = np.zeros(4), np.array([light[0], light[1], 0.0])
         length = float(np.linalg.norm(axis))
         mujoco.mju_axisAngle2Quat(turn, axis / max(length, 1e-9), LIGHT_TURN * length)
@@ -96,15 +86,13 @@ class Look:
             value = np.array(getattr(given.vis.headlight, name))
             getattr(model.vis.headlight, name)[:] = np.clip(value * ambience, DIM, 1.0)
 
-    def _paint_sky(self, camera: Camera, colour: np.ndarray) -> None:
-        given, model, sky = self._given, self._model, self._sky
+    def _paint_sky(self, colour: np.ndarray) -> None:
+        given, model, sky = self.given, self._model, self._sky
         first = given.tex_adr[sky]
         size = given.tex_height[sky] * given.tex_width[sky] * given.tex_nchannel[sky]
         texels = given.tex_data[first : first + size].reshape(-1, 3)
-        shaded = np.clip(texels + 255 * HUE * colour, 0, 255).astype(np.uint8).ravel()
-        if not np.array_equal(shaded, model.tex_data[first : first + size]):
-            model.tex_data[first : first + size] = shaded
-            camera.upload_texture(sky)
+        shaded = np.clip(texels + 255 * HUE * colour, 0, 255)
+        model.tex_data[first : first + size] = shaded.astype(np.uint8).ravel()
 
     def _place(self, place: np.ndarray) -> None:
         data = self._data

@@ -25,6 +25,8 @@ from jaxplan.tasks.perturbation import NOMINAL, Perturbation
 from jaxplan.tasks.poses import from_matrix, to_matrix
 from jaxplan.tasks.watch import Watch
 
+ONE = "one"
+"""Of objects: the same in all episodes."""
 RETREAT = 0.10
 """How far the hand backs off along its own axis after a release [m]."""
 
@@ -51,6 +53,7 @@ class Tabletop(ABC):
         perturbation: What varies in the pictures.
         look: Makes what perturbed ones are taken of, with the model's joints; the model itself
             where None.
+        objects: Which objects episodes have: `ONE` for all, or each lane is given its own.
 
     Raises:
         ValueError: There is no such camera.
@@ -69,13 +72,21 @@ class Tabletop(ABC):
         image: tuple[int, int],
         perturbation: Perturbation = NOMINAL,
         look: Callable[[], mujoco.MjModel] | None = None,
+        objects: str = ONE,
     ) -> None:
         self.name, self.robot, self.model, self.batch = name, robot, model, batch
         self.camera = camera
         self.sim = Simulator(robot, model, batch)
         self.closed = np.zeros(batch, bool)
-        self.planning_scene = Scene.from_mjcf(planning)
-        self._kinematics = InverseKinematics(robot, model)
+        self.planning_scene = Scene.from_mjcf(
+            planning, shaped=[] if objects == ONE else [movable]
+        )
+        self.objects = objects
+        rows, numbers = list(self.planning_scene.shaped), self.planning_scene.model
+        own = (np.asarray(leaf)[rows] for leaf in (numbers.geom_pos, numbers.geom_size))
+        self._geoms = [tuple(own)] * batch
+        """Places and sizes of the object's geoms, as planning sees it."""
+        self.kinematics = InverseKinematics(robot, model)
         look = look or (lambda: model)
         self.eyes = Eyes(model, look, camera, image, batch, perturbation)
         self._pads = {model.geom(pad).id for pad in robot.pads}
@@ -89,6 +100,19 @@ class Tabletop(ABC):
         self._allowed = {
             key: self.planning_scene.ignored(names) for key, names in allowed.items()
         }
+
+    def draw(self, objects: str) -> None:
+        """Takes other objects from the next episodes on.
+
+        Raises:
+            ValueError: Lanes would need another planning scene.
+        """
+        if (objects == ONE) == bool(self.planning_scene.shaped):
+            raise ValueError(
+                f"objects {objects!r} in a task that was made with {self.objects!r}: "
+                "make another"
+            )
+        self.objects = objects
 
     def expert_planner(self) -> MotionPlanner:
         """The planner of demonstrations, and of recorded problems."""
@@ -119,11 +143,35 @@ class Tabletop(ABC):
     def keyframes(self, lane: int, q: np.ndarray) -> Keyframes:
         """The expert's way from joints `q` [rad] to the next toggle. Privileged."""
 
+    def give(
+        self,
+        lane: int,
+        model: mujoco.MjModel,
+        look: Callable[[], mujoco.MjModel],
+        geoms: Mapping[str, tuple[np.ndarray, np.ndarray]],
+    ) -> None:
+        """Gives a lane an object of its own, before an episode begins.
+
+        Args:
+            lane: Whose.
+            model: Of physics, the task's but for the object.
+            look: Makes what perturbed pictures are taken of.
+            geoms: Place on the object and size [m] of what planning checks of it, by name.
+        """
+        # The near plane and the shadows are in units of the model's size.
+        model.stat.extent = self.model.stat.extent
+        model.stat.center[:] = self.model.stat.center
+        self.sim.give(lane, model)
+        self.eyes.give(lane, look)
+        names = map(self.planning_scene.geom_name, self.planning_scene.shaped)
+        pos, size = zip(*(geoms[name] for name in names), strict=True)
+        self._geoms[lane] = np.array(pos, np.float32), np.array(size, np.float32)
+
     def begin(self, lane: int, seed: int, pose: np.ndarray) -> None:
         """Arm at home, gripper open, the object at a pose `[4, 4]`."""
         self.eyes.begin(lane, seed)
         data = self.sim.data[lane]
-        mujoco.mj_resetDataKeyframe(self.model, data, 0)
+        mujoco.mj_resetDataKeyframe(data.model, data, 0)
         data.qpos[self.object_slice] = from_matrix(pose)
         self.closed[lane] = self._narrow[lane] = False
 
@@ -155,15 +203,16 @@ class Tabletop(ABC):
         Returns:
             The image, and `q` in single precision.
         """
-        present, data = self.sim.data[lane], mujoco.MjData(self.model)
+        present = self.sim.data[lane]
+        data = mujoco.MjData(present.model)
         data.qpos[:] = present.qpos
         data.qpos[self.robot.arm] = q
-        mujoco.mj_kinematics(self.model, data)
+        mujoco.mj_kinematics(data.model, data)
         if self.held(lane):
             in_hand = np.linalg.inv(self.hand_pose(present))
             pose = self.hand_pose(data) @ in_hand @ self.object_pose(lane)
             data.qpos[self.object_slice] = from_matrix(pose)
-        mujoco.mj_forward(self.model, data)
+        mujoco.mj_forward(data.model, data)
         return self.eyes.picture(lane, data), np.asarray(q, np.float32)
 
     def hand_pose(self, data: mujoco.MjData) -> np.ndarray:
@@ -178,7 +227,7 @@ class Tabletop(ABC):
 
     def tcp_at(self, q: np.ndarray) -> np.ndarray:
         """Where joints `[d]` [rad] bring it, `[3]` [m]."""
-        return self._kinematics.pose(q)[0]
+        return self.kinematics.pose(q)[0]
 
     def pads_touching(self, lane: int) -> int:
         """How many of the two pads touch the object."""
@@ -206,7 +255,7 @@ class Tabletop(ABC):
 
         From the joints alone.
         """
-        return self._kinematics.retreat(self.sim.q(lane), RETREAT)
+        return self.kinematics.retreat(self.sim.q(lane), RETREAT)
 
     def execute(self, lanes: Sequence[int], action: Action) -> np.ndarray:
         """Moves and toggles; `[B]` bool, which toggled."""
@@ -280,4 +329,5 @@ class Tabletop(ABC):
             self._allowed["held" if held else "free", touching],
             np.zeros((0, 7), np.float32),
             np.zeros((0, 3), np.float32),
+            *self._geoms[lane],
         )

@@ -7,7 +7,6 @@ one reference, so that labels never jump (methods: labels must be single-valued)
 
 from enum import IntEnum
 
-import mujoco
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
@@ -30,6 +29,8 @@ STAGING_YAWS = np.radians([-150, 100])
 that neither asks for a large turn of the wrist."""
 BOX_YAWS = np.radians([-120, 90])
 """Direction of the handle in the box [rad], likewise."""
+REACH = 0.076
+"""Of a handle that has its place in the box when the mug stands in the middle [m]."""
 DROP = 0.0015
 """Gap below the mug when it is let go [m]."""
 Q_RIM = np.array([0.1367, 0.4522, 0.1779, -2.3652, -1.1305, 2.1755, 0.4094])
@@ -50,11 +51,17 @@ Approach = tuple[list[np.ndarray], np.ndarray]
 
 
 class Expert:
-    """Answers what the predictor learns to answer, from the state that the predictor never sees."""
+    """Answers what the predictor learns to answer, from the state that the predictor never sees.
 
-    def __init__(self, model: mujoco.MjModel, shape: MugShape = MugShape()) -> None:
-        self._ik = InverseKinematics(PANDA, model)
-        self._shape = shape
+    Args:
+        kinematics: Of the arm.
+        shape: Of the mug.
+    """
+
+    def __init__(
+        self, kinematics: InverseKinematics, shape: MugShape = MugShape()
+    ) -> None:
+        self._ik, self._shape = kinematics, shape
 
     def next_toggle(self, mug: np.ndarray, q: np.ndarray, closed: bool) -> Toggle:
         """Which event comes next, for a mug pose `[4, 4]`, joints [rad] and gripper."""
@@ -62,7 +69,7 @@ class Expert:
             return Toggle.GRASP2 if mug[2, 2] > 0.9 else Toggle.GRASP1
         position, _ = self._ik.pose(q)
         inside = mug[:3, :3].T @ (position - mug[:3, 3])
-        between = (self._shape.radius + self._shape.handle_grip[0]) / 2
+        between = (self._shape.radius + self._shape.bar_radius) / 2
         by_handle = np.hypot(inside[0], inside[1]) > between
         return Toggle.RELEASE2 if by_handle else Toggle.RELEASE1
 
@@ -121,12 +128,11 @@ class Expert:
         return [lift, _moved(release, [0, 0, 0.05]), release], Q_RIM
 
     def _grasp_handle(self, mug: np.ndarray, q: np.ndarray) -> Approach:
-        radius, height = self._shape.handle_grip
         out = mug[:3, 0] * [1, 1, 0]
         out /= np.linalg.norm(out)
         across = np.cross(out, UP) * (1 if out[1] > 0 else -1)
-        contact = mug[:3, 3] + out * radius
-        contact[2] = mug[2, 3] - self._shape.height / 2 + height
+        contact = mug[:3, 3] + out * self._shape.bar_radius
+        contact[2] = mug[2, 3] - self._shape.height / 2 + self._shape.grip_height
         grasp = _pose(contact, np.stack([np.cross(across, -UP), across, -UP], 1))
         frames = [_moved(grasp, [0, 0, 0.16]), _moved(grasp, [0, 0, 0.06]), grasp]
         hand = _pose(*self._ik.pose(q))
@@ -139,6 +145,10 @@ class Expert:
         place = _moved(
             _pose(BOX_POSITION, _yaw(BOX_YAWS[int(mug[1, 0] > 0)])),
             [0, 0, BOX_FLOOR + self._shape.height / 2 + DROP],
+        )
+        # A handle that would lie on the box's wall: the mug stands beside the middle.
+        place = _moved(
+            place, -max(0.0, self._shape.handle_reach - REACH) * place[:3, 0]
         )
         release = self._hand_for(mug, q, place)
         lift = _moved(_pose(*self._ik.pose(q)), [0, 0, 0.12])

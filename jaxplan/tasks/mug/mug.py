@@ -19,7 +19,7 @@ STIFF_CONTACT = {
 
 @dataclass(frozen=True)
 class MugShape:
-    """Sizes of the mug [m].
+    """Sizes of the mug [m], its mass [kg] and its colour.
 
     Its frame has z along the axis from bottom to opening, the origin at mid-height, and the
     handle along +x. Heights of the handle are above the bottom.
@@ -35,11 +35,15 @@ class MugShape:
     handle_low: float = 0.030
     handle_high: float = 0.078
     handle_width: float = 0.012
+    grip_height: float = 0.062
+    """Where a hand takes the handle's upright bar."""
+    colour: tuple[float, float, float] = (0.16, 0.38, 0.72)
+    """Red, green and blue, 0 to 1."""
 
     @property
-    def handle_grip(self) -> tuple[float, float]:
-        """Radius of the handle's upright bar and height of its grip above the bottom [m]."""
-        return self.handle_reach - self.handle_width / 2, 0.062
+    def bar_radius(self) -> float:
+        """From the mug's axis to the middle of the handle's upright bar [m]."""
+        return self.handle_reach - self.handle_width / 2
 
 
 def collision_boxes(shape: MugShape) -> list[tuple[str, np.ndarray, np.ndarray, float]]:
@@ -83,9 +87,15 @@ def planning_spheres(shape: MugShape) -> list[tuple[np.ndarray, float]]:
         (centre in the mug's frame [m], radius [m]) of each.
     """
     ring, half = shape.radius - 0.006, shape.height / 2
+    heights = np.linspace(-half + 0.0095, half - 0.0095, 5)
+    # The outside between spheres, and the rim, stick out by 3 mm at most.
+    corner = shape.radius / np.cos(np.pi / 24) * np.exp(1j * np.pi / 12)
+    beside = max(0.0095, (heights[1] - heights[0]) / 2)
+    farthest = np.hypot(abs(corner - ring), beside)
+    radius = max(0.012, float(farthest) - 0.003)
     spheres = [
-        (np.array([ring * np.cos(angle), ring * np.sin(angle), z]), 0.012)
-        for z in np.linspace(-half + 0.0095, half - 0.0095, 5)
+        (np.array([ring * np.cos(angle), ring * np.sin(angle), z]), radius)
+        for z in heights
         for angle in 2 * np.pi * np.arange(12) / 12
     ]
     bar, low, high, w = _handle(shape)
@@ -94,6 +104,19 @@ def planning_spheres(shape: MugShape) -> list[tuple[np.ndarray, float]]:
         (shape.radius + out, z) for z in (low + w, high - w) for out in (0.008, 0.018)
     ]
     return spheres + [(np.array([x, 0, z]), 0.0105) for x, z in centres]
+
+
+def planning_geoms(shape: MugShape) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+    """What planning checks of a mug: place in its frame and size [m] of each geom, by name."""
+    boxes = {
+        f"mug_{name}": (centre, half)
+        for name, centre, half, _ in collision_boxes(shape)
+    }
+    spheres = {
+        f"mug_sphere{k}": (centre, np.array([radius, 0, 0]))
+        for k, (centre, radius) in enumerate(planning_spheres(shape))
+    }
+    return boxes | spheres
 
 
 def add_mug(spec: mujoco.MjSpec, shape: MugShape = MugShape()) -> None:

@@ -1,5 +1,6 @@
 """The mug scene: Panda, table, mug, target box, cameras; a model for physics, one for planning."""
 
+from functools import cache
 from typing import Literal, get_args
 
 import mujoco
@@ -83,6 +84,25 @@ def spec(
     """
     if variant not in get_args(Variant):
         raise ValueError(f"variant {variant!r}: plain or cluttered")
+    scene = _surroundings(kind, variant).copy()
+    scene.material("mug").rgba = [*shape.colour, 1]
+    add_mug(scene, shape)
+    for geom in list(scene.body("mug").geoms):
+        if kind == "planning" and geom.group == 3:
+            # The mug's boxes serve both: against the robot they are exact where a finger enters.
+            geom.group, geom.contype, geom.conaffinity = 4, 16, 0
+        elif kind == "physics" and geom.group == 4:
+            scene.delete(geom)
+    _add_cameras(scene)
+    home = [*PANDA.q_home, *PANDA.fingers * [PANDA.gripper.open]]
+    mug = [0.5, 0, shape.height / 2, 1, 0, 0, 0]
+    scene.add_key(name="home", qpos=[*home, *mug], ctrl=home)
+    return scene
+
+
+@cache
+def _surroundings(kind: Kind, variant: Variant) -> mujoco.MjSpec:
+    """All but the mug, made once: it takes several times as long as a mug."""
     scene = PANDA.spec()
     scene.modelname = f"mug_{kind}"
     option = scene.option
@@ -96,16 +116,8 @@ def spec(
     _add_box(scene)
     if variant == "cluttered":
         add_clutter(scene, PHYSICS | STIFF_CONTACT, PLANNING, VISUAL)
-    add_mug(scene, shape)
-    _add_cameras(scene)
-    home = [*PANDA.q_home, *PANDA.fingers * [PANDA.gripper.open]]
-    mug = [0.5, 0, shape.height / 2, 1, 0, 0, 0]
-    scene.add_key(name="home", qpos=[*home, *mug], ctrl=home)
     for geom in list(scene.geoms):
-        if kind == "planning" and geom.group == 3 and geom.parent.name == "mug":
-            # The mug's boxes serve both: against the robot they are exact where a finger enters.
-            geom.group, geom.contype, geom.conaffinity = 4, 16, 0
-        elif geom.group == (4 if kind == "physics" else 3):
+        if geom.group == (4 if kind == "physics" else 3):
             scene.delete(geom)
     return scene
 
@@ -118,9 +130,7 @@ def _add_look(scene: mujoco.MjSpec) -> None:
     scene.visual.headlight.ambient = [0.35, 0.35, 0.35]
     scene.visual.headlight.diffuse = [0.35, 0.35, 0.35]
     scene.visual.headlight.specular = [0.1, 0.1, 0.1]
-    scene.add_material(
-        name="mug", rgba=[0.16, 0.38, 0.72, 1], specular=0.5, shininess=0.6
-    )
+    scene.add_material(name="mug", specular=0.5, shininess=0.6)
     scene.add_material(name="table", rgba=[0.76, 0.67, 0.54, 1], specular=0.1)
     scene.add_material(name="box", rgba=[0.30, 0.55, 0.34, 1], specular=0.1)
     scene.add_texture(

@@ -3,18 +3,19 @@
 from collections.abc import Sequence
 from functools import partial
 
+import mujoco
 import numpy as np
 
 from jaxplan.base import Keyframes
 from jaxplan.motion import MotionPlanner
 from jaxplan.robots import PANDA
-from jaxplan.tasks.mug import judge, poses, scene
+from jaxplan.tasks.mug import judge, mugs, poses, scene
 from jaxplan.tasks.mug.expert import Expert
-from jaxplan.tasks.mug.mug import MugShape
+from jaxplan.tasks.mug.mug import MugShape, planning_geoms
 from jaxplan.tasks.mug.watch import MugWatch
 from jaxplan.tasks.mug.way import expert_planner
 from jaxplan.tasks.perturbation import NOMINAL, Perturbation
-from jaxplan.tasks.tabletop import Tabletop, full_name
+from jaxplan.tasks.tabletop import ONE, Tabletop, full_name
 
 SETTLE = 0.8
 """Time to come to rest after the drop [s]."""
@@ -27,9 +28,9 @@ class MugTask(Tabletop):
         batch: Number of episodes side by side.
         camera: `hand` or `static`.
         friction: Factor on all friction; 0 shows that grasps hold by friction alone.
-        shape: Sizes of the mug.
         variant: `plain`, or `cluttered` with obstacles across most straight lines.
         perturbation: What varies in the pictures.
+        objects: Which mugs there are: the same one, or those of `mugs.RANGES`.
 
     Raises:
         ValueError: There is no such variant.
@@ -40,28 +41,28 @@ class MugTask(Tabletop):
         batch: int,
         camera: str = "hand",
         friction: float = 1.0,
-        shape: MugShape = MugShape(),
         variant: scene.Variant = "plain",
         perturbation: Perturbation = NOMINAL,
+        objects: str = ONE,
     ) -> None:
-        model = scene.build("physics", shape, variant)
-        model.geom_friction *= friction
+        self.variant: scene.Variant = variant
+        self._friction = friction
         super().__init__(
             full_name("mug", variant),
             PANDA,
-            model,
-            scene.build("planning", shape, variant),
+            self._physics(MugShape()),
+            scene.build("planning", variant=variant),
             allowed_contacts(),
             "mug",
             batch,
             camera,
             (scene.IMAGE_HEIGHT, scene.IMAGE_WIDTH),
             perturbation,
-            partial(scene.look, shape, variant),
+            partial(scene.look, variant=variant),
+            objects,
         )
-        self.shape = shape
-        self.variant: scene.Variant = variant
-        self.expert = Expert(model, shape)
+        self.shapes = [MugShape()] * batch
+        """The lanes' mugs. Privileged."""
 
     def expert_planner(self) -> MotionPlanner:
         """The planner of demonstrations, and of recorded problems."""
@@ -77,8 +78,10 @@ class MugTask(Tabletop):
         The result depends on the seed alone, bit for bit. Nothing asks whether the pose is easy.
         """
         for lane, seed in zip(lanes, seeds, strict=True):
+            if self.objects != ONE:
+                self._take(lane, mugs.mug_of(self.objects, seed))
             pose = np.eye(4)
-            pose[:3, 3], pose[:3, :3] = poses.sample_pose(seed, self.shape)
+            pose[:3, 3], pose[:3, :3] = poses.sample_pose(seed, self.shapes[lane])
             self.begin(lane, seed, pose)
         self.wait(lanes, SETTLE)
 
@@ -90,8 +93,9 @@ class MugTask(Tabletop):
 
     def keyframes(self, lane: int, q: np.ndarray) -> Keyframes:
         """The expert's way to the next toggle. Privileged."""
+        expert = Expert(self.kinematics, self.shapes[lane])
         closed = bool(self.closed[lane])
-        return self.expert.keyframes(self.object_pose(lane), q.astype(float), closed)
+        return expert.keyframes(self.object_pose(lane), q.astype(float), closed)
 
     def in_terminal_region(self, lane: int) -> bool:
         """Q_term: the open hand is low over the target box. Known from the joints alone."""
@@ -109,6 +113,17 @@ class MugTask(Tabletop):
             self.closed[lane],
             self.pads_touching(lane) > 0,
         )
+
+    def _take(self, lane: int, shape: MugShape) -> None:
+        """Another mug for a lane."""
+        look = partial(scene.look, shape, self.variant)
+        self.give(lane, self._physics(shape), look, planning_geoms(shape))
+        self.shapes[lane] = shape
+
+    def _physics(self, shape: MugShape) -> mujoco.MjModel:
+        model = scene.build("physics", shape, self.variant)
+        model.geom_friction *= self._friction
+        return model
 
 
 def allowed_contacts() -> dict[tuple[str, bool], list[str]]:
