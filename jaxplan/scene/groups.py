@@ -1,6 +1,6 @@
 """Contact groups by the names of their bodies and geoms."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 
@@ -35,3 +35,13 @@ def table_of(groups: Sequence[Group], geoms: int) -> np.ndarray:
             for i, j in geom_pairs(contact):
                 table[i, j] = table[j, i] = index
     return table
+
+
+def pairs_of(groups: Sequence[Group], name: Callable[[int], str]) -> list[tuple]:
+    """(group, geom, geom) of every pair, by name."""
+    return [
+        (group.name, name(i), name(j))
+        for group in groups
+        for contact in group.contacts
+        for i, j in geom_pairs(contact)
+    ]

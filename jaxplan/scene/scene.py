@@ -22,15 +22,14 @@ import numpy as np
 
 from jaxplan.process import refuse_fork
 from jaxplan.scene.chain import line
-from jaxplan.scene.contacts import geom_pairs
 from jaxplan.scene.excludes import ALWAYS, Exclude, Excluded
-from jaxplan.scene.groups import mask_of, table_of
+from jaxplan.scene.groups import mask_of, pairs_of, table_of
 from jaxplan.scene.limits import arm_limits, circular, rates
 from jaxplan.scene.names import geom_name, known, shortened
 from jaxplan.scene.numbers import Numbers, read_numbers
 from jaxplan.scene.source import SLOTS, check_arguments, compile_model
 from jaxplan.scene.srdf import read_srdf
-from jaxplan.scene.structure import Group, Slot, Structure, read_structure
+from jaxplan.scene.structure import Group, Slot, Structure, read_again, read_structure
 from jaxplan.scene.urdf import read_urdf
 
 
@@ -96,9 +95,8 @@ class Scene:
         """
         refuse_fork()
         check_arguments(source, joints, hand, slots)
-        slots = slots or {}
-        model = compile_model(source, slots)
-        names = SLOTS if any(slots.values()) else None
+        model = compile_model(source, slots or {})
+        names = SLOTS if slots and any(slots.values()) else None
         structure = read_structure(model, joints, hand, names, exclude, shaped)
         numbers = read_numbers(model)
         arm_limits(structure, numbers)  # raises where a joint has no room
@@ -149,11 +147,8 @@ class Scene:
         if changed := fields.keys() & {"geom_quat", *follows}:
             model = copy.copy(self.mj_model)
             for name in changed:
-                getattr(model, name)[:] = np.asarray(fields[name])
-            names = self.joints, self.hand, SLOTS if self.slots else None
-            structure = read_structure(
-                model, *names, structure.excludes, structure.shaped_objects
-            )
+                getattr(model, name)[:] = fields[name]
+            structure = read_again(structure, model)
         return Scene(self.model._replace(**fields), structure)
 
     @property
@@ -174,9 +169,8 @@ class Scene:
     @property
     def dependent(self) -> tuple[str, ...]:
         """Joints that follow the arm's or passive ones by an <equality><joint>."""
-        return tuple(
-            self.structure.joint_names[d.joint] for d in self.structure.dependent
-        )
+        names = self.structure.joint_names
+        return tuple(names[follows.joint] for follows in self.structure.dependent)
 
     @property
     def objects(self) -> tuple[str, ...]:
@@ -191,9 +185,7 @@ class Scene:
     @property
     def bases(self) -> tuple[str, ...]:
         """Objects on which the arm hangs: they stand where they are placed, never held."""
-        bodies = self.structure.moved | {self.body_id(self.hand)}
-        above = {body for moved in bodies for body in self.line(moved)}
-        return tuple(name for name in self.objects if self.body_id(name) in above)
+        return self.structure.bases
 
     @property
     def slots(self) -> tuple[Slot, ...]:
@@ -291,12 +283,7 @@ class Scene:
     @property
     def pairs(self) -> list[tuple[str, str, str]]:
         """(group, geom, geom) of every pair that is checked, by name."""
-        return [
-            (group.name, self.geom_name(i), self.geom_name(j))
-            for group in self.groups
-            for contact in group.contacts
-            for i, j in geom_pairs(contact)
-        ]
+        return pairs_of(self.groups, self.geom_name)
 
     def group_table(self) -> np.ndarray:
         """`[ngeom, ngeom]` contact group of each pair of geoms, -1 = none."""

@@ -19,32 +19,11 @@ from jaxplan.scene.contacts import (
 from jaxplan.scene.dependent import Dependent, in_order, root_of
 from jaxplan.scene.excludes import Exclude, Excludes, find_excludes
 from jaxplan.scene.flexes import refuse_flexes
+from jaxplan.scene.links import Link, read_links
 from jaxplan.scene.loops import refuse_loops
-from jaxplan.scene.names import geom_name, known, names_of
+from jaxplan.scene.names import known, names_of
+from jaxplan.scene.shaped import shaped_geoms
 from jaxplan.scene.touching import Moving, near_distances
-
-SHAPEABLE = ("sphere", "capsule", "cylinder", "ellipsoid", "box")
-"""Kinds of geoms whose sizes say all of their shape."""
-
-
-class Link(NamedTuple):
-    """One step of the kinematic tree: a frame that one joint at most moves.
-
-    A body with several joints is several links; its frame is that of the last.
-    """
-
-    body: int
-    offset: bool
-    """Starts with the body's own offset from its parent: its first link does."""
-    parent: int
-    """Row of the link that it hangs on; 0 = the world."""
-    joint: int
-    """Joint id, or -1."""
-    slides: bool
-    variable: int
-    """Its joint's index in `Structure.variables`, or -1."""
-    object: int
-    """Its index in the movable objects, or -1."""
 
 
 class Group(NamedTuple):
@@ -96,6 +75,14 @@ class Structure:
     hand may hold, then what hangs on them."""
     link_of: dict[int, int]
     """Row of a body's frame, by body id."""
+
+    @property
+    def bases(self) -> tuple[str, ...]:
+        """Objects on which the arm hangs."""
+        ends = self.moved | {self.body_names.index(self.hand)}
+        above = {body for end in ends for body in line(self.mj_model, end)}
+        names = self.body_names
+        return tuple(name for name in self.objects if names.index(name) in above)
 
     @property
     def shaped_objects(self) -> tuple[str, ...]:
@@ -166,7 +153,7 @@ def read_structure(
         needed |= {side.body for contact in group.contacts for side in contact}
     needed = {a for body in needed for a in line(model, body)}
     base = int(model.body_rootid[bodies.index(hand)])
-    links, link_of = _links(model, needed, every, variables, [*free, *mocap], base)
+    links, link_of = read_links(model, needed, every, variables, [*free, *mocap], base)
     return Structure(
         mj_model=model,
         body_names=bodies,
@@ -184,11 +171,31 @@ def read_structure(
             for g, body in enumerate(model.geom_bodyid)
             if bodies[body] == slots
         ),
-        shaped=_shaped(model, bodies, [*free, *mocap], shaped, groups),
+        shaped=shaped_geoms(
+            model,
+            bodies,
+            [*free, *mocap],
+            shaped,
+            [c for g in groups for c in g.contacts],
+        ),
         groups=groups,
         excludes=exclude,
         links=links,
         link_of=link_of,
+    )
+
+
+def read_again(structure: Structure, model: mujoco.MjModel) -> Structure:
+    """That of a changed model, with all that the structure was read with."""
+    bodies = model.geom_bodyid[[slot.geom for slot in structure.slots]]
+    room = structure.body_names[bodies[0]] if len(bodies) else None
+    return read_structure(
+        model,
+        structure.joints,
+        structure.hand,
+        room,
+        structure.excludes,
+        structure.shaped_objects,
     )
 
 
@@ -203,7 +210,7 @@ def only_line(structure: Structure, body: int) -> Structure:
     needed = set(line(model, body))
     if needed & set(objects):
         needed |= set(line(model, hand))
-    links, link_of = _links(
+    links, link_of = read_links(
         model,
         needed,
         structure.joint_names,
@@ -259,73 +266,3 @@ def _groups(
             name = "|".join(sorted(names[body] for body in pair))
             groups.append(Group(name, tuple(contacts), () if arm & apart else held))
     return tuple(groups)
-
-
-def _shaped(
-    model: mujoco.MjModel,
-    names: tuple[str, ...],
-    objects: list[int],
-    shaped: Sequence[str],
-    groups: tuple[Group, ...],
-) -> tuple[int, ...]:
-    """Geoms of shaped objects that can touch something.
-
-    Raises:
-        ValueError: An object is none, or one of its geoms is a mesh.
-    """
-    movable = [names[body] for body in objects]
-    bodies = {names.index(known(name, "movable object", movable)) for name in shaped}
-    sides = {s for group in groups for contact in group.contacts for s in contact}
-    own = [side for side in sides if side.body in bodies]
-    for side in own:
-        if side.kind not in SHAPEABLE:
-            name = geom_name(model, names, side.ids[0])
-            raise ValueError(
-                f"{name!r} is a {side.kind}, which has no size to be given: "
-                f"{', '.join(SHAPEABLE)} have"
-            )
-    return tuple(sorted({geom for side in own for geom in side.ids}))
-
-
-def _links(
-    model: mujoco.MjModel,
-    needed: set[int],
-    names: tuple[str, ...],
-    variables: Sequence[int],
-    objects: list[int],
-    base: int,
-) -> tuple[tuple[Link, ...], dict[int, int]]:
-    """Links of the bodies that are needed, and the row of each body.
-
-    Args:
-        model: The model.
-        needed: Bodies, with all above them.
-        names: Of joints, by id.
-        variables: Ids of joints, as `Structure.variables`.
-        objects: Bodies of the movable objects.
-        base: The root of the hand's tree, perhaps one of them: it is never held.
-    """
-    free = {body: i for i, body in enumerate(objects)}
-    hung = {b for b in needed if model.body_rootid[b] in free.keys() - {base}}
-    rank = {b: (b in hung) + (b in hung and b not in free) for b in needed}
-    links: list[Link] = []
-    row = {0: 0}
-    for body in sorted(needed, key=lambda b: (rank[b], b)):
-        parent = row[0 if body in free else int(model.body_parentid[body])]
-        first = int(model.body_jntadr[body])
-        ids = range(first, first + int(model.body_jntnum[body]))
-        if body in free or not ids:
-            links.append(Link(body, True, parent, -1, False, -1, free.get(body, -1)))
-        for j in ids if body not in free else ():
-            if j not in variables:
-                raise ValueError(
-                    f"ball joint {names[j]!r} is not supported: the arm or something that "
-                    "it can touch hangs on it; use three hinges"
-                )
-            slides = bool(model.jnt_type[j] == mujoco.mjtJoint.mjJNT_SLIDE)
-            above = parent if j == first else len(links)
-            links.append(
-                Link(body, j == first, above, j, slides, variables.index(j), -1)
-            )
-        row[body] = len(links)
-    return tuple(links), row
