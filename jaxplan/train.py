@@ -194,7 +194,7 @@ def _teacher(
 def _read(config: TrainConfig) -> tuple[data.Shard, dict[str, Any]]:
     """All demonstrations; what they show, and each directory's manifest checksum."""
     shards = [data.read_demonstrations(directory) for directory in config.data]
-    shard = shards[0] if len(shards) == 1 else data.concatenate(shards)
+    shard = data.concatenate(shards)
     logger.info("%d frames of %d episodes", len(shard.q), len(shard.episode_seed))
     hashes: dict[str, str] = {}
     for directory in map(Path, config.data):
