@@ -9,8 +9,8 @@ of other stops nothing is to be learned but to stop.
 """
 
 from collections.abc import Sequence
+from typing import Any
 
-import mujoco
 import numpy as np
 
 from jaxplan.base import Phase
@@ -84,7 +84,7 @@ class TimedRecorder:
             **episode_columns(records),
         )
 
-    def _tick(self, lane: int, data: mujoco.MjData) -> None:
+    def _tick(self, lane: int, data: Any) -> None:
         """A control period has passed."""
         self._ticks[lane] += 1
         due = len(self._states[lane]) < len(self._frames[lane])
