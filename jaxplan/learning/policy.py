@@ -34,7 +34,7 @@ class PolicyTraining(TrainConfig):
     augment: AugmentConfig = AugmentConfig()
     near_toggle: Whole = 8
     """Frames so near to a toggle, before and after it, ..."""
-    toggle_weight: Count = 4
+    toggle_weight: Count = 2
     """... are seen this often while others are seen once, lest waits and ways drown them."""
     camera_weight: NotNegative = 1.0
     """Of the camera's error in the loss, where the network says it."""

@@ -1,6 +1,7 @@
 """A policy as an agent of the episode loop: shown each observation, and asked now and then."""
 
 from collections.abc import Sequence
+from typing import Protocol
 
 import jax
 import numpy as np
@@ -13,18 +14,28 @@ from jaxplan.policies.drive import Drive, DrivenTask, Step
 from jaxplan.policies.registry import policy_of
 
 
+class SeenTask(DrivenTask, Protocol):
+    """And whose pictures it is shown."""
+
+    name: str
+    camera: str
+
+
 class PolicyAgent:
     """Says a chunk of actions, has the first ones executed, and says the next one.
 
     Args:
         task: Whose arms it moves.
-        camera: Whose images it sees.
         weights: Of a policy's network.
+
+    Raises:
+        WeightsError: Weights of another task, camera or robot.
     """
 
-    def __init__(self, task: DrivenTask, camera: str, weights: Weights) -> None:
+    def __init__(self, task: SeenTask, weights: Weights) -> None:
+        weights.check_fits(task.name, task.camera, task.robot.name)
         config, policy = weights.config, policy_of(weights.config)
-        self.config, self._camera, self._lanes = config, camera, task.batch
+        self.config, self._camera, self._lanes = config, task.camera, task.batch
         self._drive = Drive(task)
 
         def network(keys: jax.Array, *window: jax.Array) -> Chunk:
