@@ -129,7 +129,7 @@ few_step = FewStepTraining(
 
 imitation: dict[str, Any] = {
     "data": ("data/mug_timed",),
-    "out": "jaxplan/pretrained/policies",
+    "out": "weights/policies",
     "optimizer": OptimizerConfig(learning_rate=5e-4, gradient_clip=10.0),
     "steps": 30_000,
     "batch_size": 32,

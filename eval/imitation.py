@@ -44,8 +44,8 @@ class Args(Checked):
     """Whose episodes run."""
     weights: Path | None = None
     """Directory with predictor, sampler and manifest; None = those shipped for the scene."""
-    policies: Path | None = None
-    """Directory with the policies' weights; None = `policies` beside the others."""
+    policies: Path = Path("weights/policies")
+    """Directory with the policies' weights."""
     quick: bool = False
     """Four seeds, and half a minute an episode: to see that everything runs."""
     study: ImitationConfig = ImitationConfig()
@@ -62,10 +62,8 @@ def main(args: Args) -> None:
         known = ", ".join((OURS, *POLICIES))
         raise ValueError(f"agent {min(unknown)!r}: there is {known}")
     place = args.weights or shipped(study.variant)
-    networks = {
-        name: load_pair(place)
-        if name == OURS
-        else (load_weights(name, args.policies or place / "policies"),)
+    networks: dict[str, Any] = {
+        name: load_pair(place) if name == OURS else (load_weights(name, args.policies),)
         for name in args.agents
     }
     task = tasks.load(

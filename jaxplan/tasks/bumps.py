@@ -46,7 +46,9 @@ class BumpWatch:
     def finish(self, lanes: Sequence[int]) -> list[Bumps]:
         """What was hit in some lanes; begins anew."""
         rows = [
-            Bumps(*map(int, self._count[e]), float(self._hardest[e])) for e in lanes
+            Bumps(int(table), int(others), float(self._hardest[e]))
+            for e in lanes
+            for table, others in self._count[[e]]
         ]
         self.begin()
         return rows
