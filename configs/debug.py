@@ -3,6 +3,8 @@
     python -m jaxplan.train predictor --config configs/debug.py --data DIR
     python -m jaxplan.train sampler --config configs/debug.py --data DIR
     (cvae, gan and few_step likewise, the last one after the sampler)
+    python -m jaxplan.train diffusion_policy --config configs/debug.py --data TIMED
+    (lstm_gmm and transformer likewise)
 
 Seconds. Expected: the loss falls.
 """
@@ -12,11 +14,19 @@ from typing import Any
 from jaxplan.learning import OptimizerConfig, PredictorTraining
 from jaxplan.networks import (
     CvaeConfig,
+    DiffusionPolicyConfig,
     EncoderConfig,
     FewStepConfig,
     GanConfig,
+    LstmGmmConfig,
     PredictorConfig,
     SamplerConfig,
+    TransformerConfig,
+)
+from jaxplan.policies import (
+    DiffusionPolicyTraining,
+    LstmGmmTraining,
+    TransformerTraining,
 )
 from jaxplan.samplers import CvaeTraining, FewStepTraining, GanTraining, SamplerTraining
 
@@ -77,4 +87,38 @@ gan = GanTraining(
         generator=(32, 32), discriminator=(32, 32), encoder=None, relative=True
     ),
     **few,
+)
+
+small: dict[str, Any] = {
+    "encoder": EncoderConfig(
+        stem="patch4", width=8, blocks=(1, 1), keypoints=8, features=16
+    ),
+    "hidden": 32,
+}
+tiny: dict[str, Any] = {
+    "steps": 20,
+    "batch_size": 8,
+    "optimizer": OptimizerConfig(learning_rate=1e-3),
+    "log_every": 5,
+    "validate_every": 10,
+    "checkpoint_every": 10,
+    "val_windows": 16,
+}
+
+diffusion_policy = DiffusionPolicyTraining(
+    name="debug_diffusion_policy",
+    network=DiffusionPolicyConfig(widths=(16, 32), kernel=3, cond_features=32, **small),
+    **tiny,
+)
+
+lstm_gmm = LstmGmmTraining(
+    name="debug_lstm_gmm",
+    network=LstmGmmConfig(history=3, width=32, observation_features=32, **small),
+    **tiny,
+)
+
+transformer = TransformerTraining(
+    name="debug_transformer",
+    network=TransformerConfig(history=3, layers=1, width=32, heads=2, **small),
+    **tiny,
 )

@@ -14,7 +14,7 @@ import numpy as np
 
 from jaxplan.base import Action, Observation, Subgoal
 from jaxplan.collision import World
-from jaxplan.episodes import moves
+from jaxplan.episodes import moves, phase_keys
 from jaxplan.motion import Motion, MotionPlanner
 from jaxplan.planning import DrawBank, Status
 from jaxplan.ranges import Checked, NotNegative, Positive, Whole
@@ -266,13 +266,3 @@ class Algorithm1:
             "planning_seconds": motion.seconds / running,
             "smoothing": Rung(motion.rung[lane]).name if found else "NONE",
         }
-
-
-def phase_keys(seeds: np.ndarray, numbers: np.ndarray) -> jax.Array:
-    """A typed key for each phase `[P]`, from its episode's seed and its number in the episode.
-
-    Whatever runs beside it: search and sampler get the same random numbers again.
-    """
-    return jax.vmap(
-        lambda seed, number: jax.random.fold_in(jax.random.key(seed), number)
-    )(seeds.astype(np.uint32), numbers.astype(np.int32))

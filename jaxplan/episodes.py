@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
+import jax
 import numpy as np
 
 from jaxplan.base import Agent, Listener, Phase, Task
@@ -84,6 +85,16 @@ def run_episodes(
 def moves(q: np.ndarray) -> bool:
     """Whether commands `[T, d]` [rad] are a motion at all."""
     return len(q) > 1 and bool(np.ptp(q, axis=0).max() > STILL)
+
+
+def phase_keys(seeds: np.ndarray, numbers: np.ndarray) -> jax.Array:
+    """A typed key for each phase `[P]`, from its episode's seed and its number in the episode.
+
+    Whatever runs beside it: search and sampler get the same random numbers again.
+    """
+    return jax.vmap(
+        lambda seed, number: jax.random.fold_in(jax.random.key(seed), number)
+    )(seeds.astype(np.uint32), numbers.astype(np.int32))
 
 
 def _run_batch(

@@ -1,6 +1,7 @@
 """`python -m jaxplan.train KIND --config configs/NAME.py [--overrides]`.
 
-KIND is predictor, sampler (diffusion), cvae, gan or few_step.
+KIND is predictor; sampler (diffusion), cvae, gan or few_step; or diffusion_policy, lstm_gmm or
+transformer.
 
 Trains one network from demonstrations to exported weights. Started again, it goes on from
 the run's newest checkpoint. `--help` lists every setting.
@@ -23,17 +24,20 @@ import numpy as np
 import tyro
 
 from jaxplan import data, learning, pretrained
-from jaxplan.learning import predictor, sampler, segments
+from jaxplan.learning import policy, predictor, sampler, segments
 from jaxplan.learning.loop import TrainConfig
+from jaxplan.learning.policy import PolicyTraining
 from jaxplan.learning.predictor import PredictorTraining
 from jaxplan.learning.sampler import SegmentTraining
 from jaxplan.learning.train_state import Params
 from jaxplan.learning.weights import merged
+from jaxplan.policies import POLICIES, Policy
+from jaxplan.policies import init as init_policy
 from jaxplan.pretrained import UPPER
 from jaxplan.process import BAD_INPUT, exit_code
 from jaxplan.samplers import FAMILIES, Family, init
 
-Training = PredictorTraining | SegmentTraining
+Training = PredictorTraining | SegmentTraining | PolicyTraining
 RUNS = Path("runs")
 
 logger = logging.getLogger(__name__)
@@ -45,8 +49,8 @@ class UsageError(ValueError):
 
 def kinds() -> dict[str, type]:
     """What can be trained, and the class of its settings."""
-    families = {family.name: family.training for family in FAMILIES.values()}
-    return {UPPER: PredictorTraining, **families}
+    learned = (*FAMILIES.values(), *POLICIES.values())
+    return {UPPER: PredictorTraining, **{each.name: each.training for each in learned}}
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -61,8 +65,11 @@ def main(arguments: list[str] | None = None) -> int:
         if isinstance(config, PredictorTraining):
             path = train_predictor(config)
         else:
-            names = {kind: name for name, kind in kinds().items()}
-            path = train_sampler(FAMILIES[names[type(config)]], config)
+            name = {kind: name for name, kind in kinds().items()}[type(config)]
+            if isinstance(config, PolicyTraining):
+                path = train_policy(POLICIES[name], config)
+            else:
+                path = train_sampler(FAMILIES[name], config)
         logger.info("weights: %s", path)
         return 0
     except learning.TrainingDiverged as error:
@@ -166,6 +173,29 @@ def train_sampler(family: Family, config: SegmentTraining) -> Path:
     return _export(config, family.name, state.ema_params, metrics, origin)
 
 
+def train_policy(kind: Policy, config: PolicyTraining) -> Path:
+    """Trains an imitation policy and exports it; returns the weights' path."""
+    shard, origin = _read(config, data.TimedShard)
+    config = dataclasses.replace(config, network=policy.fitted(config.network, shard))
+    held = learning.held_out(shard.seed, config.val_fraction)
+    rows, val_rows = _split(np.arange(len(shard.q)), held)
+    loss, gather = partial(kind.loss, config), policy.Windows(shard, config.network)
+    key = jax.random.key(config.seed)
+    fresh = jax.jit(init_policy, static_argnums=0)(config.network, key)
+    state, metrics = learning.fit(
+        config,
+        RUNS / config.name,
+        _initial(config, kind.name, fresh),
+        loss,
+        policy.weighted(config, shard, rows),
+        gather,
+        policy.validation(config, kind.act, loss, gather, val_rows),
+        origin,
+        export=partial(_snapshot, config, kind.name, origin),
+    )
+    return _export(config, kind.name, state.ema_params, metrics, origin)
+
+
 def _teacher(
     family: Family, config: Any, upper: learning.Weights | None
 ) -> learning.Weights | None:
@@ -191,10 +221,10 @@ def _teacher(
     return teacher
 
 
-def _read(config: TrainConfig) -> tuple[data.Shard, dict[str, Any]]:
+def _read(config: TrainConfig, kind: type = data.Shard) -> tuple[Any, dict[str, Any]]:
     """All demonstrations; what they show, and each directory's manifest checksum."""
-    shards = [data.read_demonstrations(directory) for directory in config.data]
-    shard = shards[0] if len(shards) == 1 else data.concatenate(shards)
+    shards = [data.read_demonstrations(directory, kind) for directory in config.data]
+    shard = data.concatenate(shards)
     logger.info("%d frames of %d episodes", len(shard.q), len(shard.episode_seed))
     hashes: dict[str, str] = {}
     for directory in map(Path, config.data):
@@ -250,6 +280,19 @@ def _initial(config: Training, kind: str, fresh: Params) -> Params:
         raise UsageError(
             f"{config.init} holds a {kind} with other --network settings: see {layer}"
         ) from None
+
+
+def _snapshot(
+    config: PolicyTraining,
+    name: str,
+    origin: dict[str, Any],
+    step: int,
+    params: Params,
+    metrics: dict[str, float],
+) -> None:
+    """Weights on the way, whose success in closed loop says whether training has converged."""
+    place = RUNS / config.name / "snapshots" / f"{step:06d}"
+    _export(dataclasses.replace(config, out=str(place)), name, params, metrics, origin)
 
 
 def _export(

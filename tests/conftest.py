@@ -101,3 +101,17 @@ def demos(tmp_path_factory) -> str:
     data.write_shard(data.shard_path(directory, 0), demonstrations())
     data.write_manifest(directory, {"made": "for a test"})
     return str(directory)
+
+
+@pytest.fixture(scope="module")
+def timed_demos(tmp_path_factory) -> str:
+    """The same of whole episodes, for policies."""
+    from toy_timed import timed
+
+    from jaxplan import data
+
+    directory = tmp_path_factory.mktemp("timed")
+    data.write_shard(data.shard_path(directory, 0), timed())
+    made = {"task": "mug", "camera": "hand", "robot": "panda"}
+    data.write_manifest(directory, made)
+    return str(directory)

@@ -18,7 +18,7 @@ LAYERS = (
     {"collision", "robots"},
     {"data", "ik", "networks", "simulation"},
     {"learning", "motion"},
-    {"samplers"},
+    {"policies", "samplers"},
     {"pretrained", "tasks"},
     {"algorithm1"},
     {"demonstrations", "learned", "pictures"},

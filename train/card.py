@@ -12,7 +12,14 @@ from typing import Any
 import numpy as np
 
 from jaxplan import data
-from jaxplan.data import TOGGLES, Shard, read_manifest, write_atomic
+from jaxplan.data import (
+    TOGGLES,
+    Demonstrations,
+    Shard,
+    TimedShard,
+    read_manifest,
+    write_atomic,
+)
 from jaxplan.tasks import ONE, TASKS
 from jaxplan.tasks.starts import Starts
 
@@ -24,7 +31,8 @@ def write_card(directory: Path) -> None:
     """Writes `CARD.md` and `card.json` for a finished collection."""
     manifest = read_manifest(directory)
     shards = [directory / name for name in manifest["shards"]]
-    card = describe(data.read_demonstrations(directory), manifest["settings"])
+    kind = Shard if "frame_period" not in manifest["settings"] else TimedShard
+    card = describe(data.read_demonstrations(directory, kind), manifest["settings"])
     card["shards"] = len(shards)
     card["megabytes"] = round(sum(path.stat().st_size for path in shards) / 1e6, 1)
     text = json.dumps(card, indent=2, sort_keys=True) + "\n"
@@ -32,7 +40,7 @@ def write_card(directory: Path) -> None:
     write_atomic(directory / "CARD.md", as_markdown(card).encode())
 
 
-def describe(shard: Shard, settings: dict[str, Any]) -> dict[str, Any]:
+def describe(shard: Demonstrations, settings: dict[str, Any]) -> dict[str, Any]:
     """What the shards of a collection hold, JSON-ready."""
     success = shard.episode_success
     failures = Counter(str(f) for f in shard.episode_failure[~success])
@@ -53,8 +61,23 @@ def describe(shard: Shard, settings: dict[str, Any]) -> dict[str, Any]:
         "frames_by_toggle": {
             name: int((shard.toggle == i).sum()) for i, name in enumerate(TOGGLES)
         },
+        **(_paths(shard) if isinstance(shard, Shard) else _pace(shard)),
+    }
+
+
+def _paths(shard: Shard) -> dict[str, float]:
+    return {
         "paths": len(shard.path_q),
         "path_length_median [rad]": float(np.median(shard.path_length)),
+    }
+
+
+def _pace(shard: TimedShard) -> dict[str, float]:
+    lengths = np.unique(shard.seed, return_counts=True)[1]
+    toggling = shard.gripper != shard.action_gripper
+    return {
+        "frames an episode, median": float(np.median(lengths)),
+        "frames that toggle": int(toggling.sum()),
     }
 
 
@@ -88,7 +111,7 @@ def as_markdown(card: dict[str, Any]) -> str:
         "",
         f"{card['episodes']} episodes from seed {settings['first_seed']}, of which the expert "
         f"solved {card['succeeded']}; {card['frames']} frames from the camera "
-        f"`{settings['camera']}` on {card['paths']} paths; {card['shards']} shards, "
+        f"`{settings['camera']}`{_what(card)}; {card['shards']} shards, "
         f"{card['megabytes']} MB.",
         "",
         *_table("Randomised", "value", card["randomised"]),
@@ -98,6 +121,14 @@ def as_markdown(card: dict[str, Any]) -> str:
     for name, parts in card["success_by_start"].items():
         lines += _table(name, "succeeded", parts)
     return "\n".join(lines)
+
+
+def _what(card: dict[str, Any]) -> str:
+    if "paths" in card:
+        return f" on {card['paths']} paths"
+    each = card["frames an episode, median"]
+    period = card["settings"]["frame_period"]
+    return f", one each {period} s ({each:.0f} an episode), with the expert's actions"
 
 
 def _share(success: np.ndarray) -> str:

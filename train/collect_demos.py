@@ -2,7 +2,8 @@
 
 Shards are written one by one and are byte-identical however often the run is killed and begun
 again; a finished collection has a manifest with the checksum of each, and a card (`CARD.md`) that
-says what is in it.
+says what is in it. With `--timed` the same episodes are kept whole, a frame each 100 ms with the
+expert's action: what policies learn from.
 """
 
 import dataclasses
@@ -17,7 +18,12 @@ from tqdm import tqdm
 
 from jaxplan import data, tasks
 from jaxplan.cli import run_script
-from jaxplan.demonstrations import DemonstrationConfig, ExpertAgent, Recorder
+from jaxplan.demonstrations import (
+    DemonstrationConfig,
+    ExpertAgent,
+    Recorder,
+    TimedRecorder,
+)
 from jaxplan.episodes import run_episodes
 from jaxplan.ranges import Checked, Count, Whole
 from jaxplan.tasks.perturbation import NOMINAL, Perturbation
@@ -32,6 +38,8 @@ class Args(Checked):
     first_seed: Whole = 0
     shard_size: Count = 32
     """Episodes a shard; one batch in lockstep."""
+    timed: bool = False
+    """Whole episodes at an even pace, for policies."""
     camera: str = "hand"
     task: str = tasks.DEFAULT
     variant: str = "plain"
@@ -64,7 +72,11 @@ class Collector:
         args, task, expert = self._args, self._task, self._expert
         first = args.first_seed + index * args.shard_size
         seeds = range(first, first + args.shard_size)
-        recorder = Recorder(task, expert, seeds, args.demonstration)
+        recorder = (
+            TimedRecorder(task, expert, seeds)
+            if args.timed
+            else Recorder(task, expert, seeds, args.demonstration)
+        )
         records = run_episodes(task, expert, seeds, listeners=[recorder])
         data.write_shard(data.shard_path(args.out, index), recorder.shard(records))
         return sum(record.success for record in records), len(records)
@@ -98,6 +110,8 @@ def main(args: Args) -> None:
         "objects": args.objects,
         "demonstration": dataclasses.asdict(args.demonstration),
     }
+    if args.timed:
+        settings["frame_period"] = data.FRAME_PERIOD
     args.out.mkdir(parents=True, exist_ok=True)
     missing = data.missing_shards(args.out, count, settings)
     data.write_manifest(args.out, settings)

@@ -90,9 +90,9 @@ def make_world(
         passive = scene.mj_model.qpos0[scene.addresses(scene.passive)]
     rows = np.array(scene.shaped, int)
     if geom_pos is None:
-        geom_pos = np.asarray(scene.model.geom_pos)[rows]
+        geom_pos = jnp.asarray(scene.model.geom_pos)[rows]
     if geom_size is None:
-        geom_size = np.asarray(scene.model.geom_size)[rows]
+        geom_size = jnp.asarray(scene.model.geom_size)[rows]
     world = World(
         jnp.asarray(object_pose, jnp.float32),
         jnp.asarray(held, bool),

@@ -1,5 +1,6 @@
 """What a demonstration shard holds, and the checks that every shard passes."""
 
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -9,6 +10,8 @@ from jaxplan.robots.panda.mount import MOUNT
 IMAGE_SHAPE = (MOUNT.height, MOUNT.width, 3)
 PATH_POINTS = 64
 NO_PATH = -1
+FRAME_PERIOD = 0.1
+"""Time between two frames of a timed demonstration, and between two actions of a policy [s]."""
 TOGGLES = ("grasp1", "release1", "grasp2", "release2")
 
 
@@ -57,6 +60,40 @@ class Shard(NamedTuple):
     """str [E], why the episode failed; empty = it did not."""
 
 
+class TimedShard(NamedTuple):
+    """Whole episodes, a frame each `FRAME_PERIOD`, and what the expert did until the next one.
+
+    F frames, those of an episode one after another; E episodes. While the gripper toggles the arm
+    waits, and no frames are kept.
+    """
+
+    image: np.ndarray
+    """u8 [F, 88, 136, 3], RGB."""
+    q: np.ndarray
+    """f32 [F, d] [rad]."""
+    gripper: np.ndarray
+    """u8 [F]: 0 open, 1 closed."""
+    action_q: np.ndarray
+    """f32 [F, d], where the arm is commanded to be a period later [rad]."""
+    action_gripper: np.ndarray
+    """u8 [F], the gripper's mode from then on: 0 open, 1 closed."""
+    toggle: np.ndarray
+    """i8 [F], index into `TOGGLES` of the toggle that comes next."""
+    seed: np.ndarray
+    """i32 [F], the episode's seed."""
+    camera_error: np.ndarray
+    """f32 [F, 5], how the camera was off its mount: yaw, pitch [rad], right, up, back [m]."""
+    episode_seed: np.ndarray
+    """i32 [E]."""
+    episode_success: np.ndarray
+    """bool [E]."""
+    episode_failure: np.ndarray
+    """str [E], why the episode failed; empty = it did not."""
+
+
+Demonstrations = Shard | TimedShard
+KINDS: tuple[type[Any], ...] = (Shard, TimedShard)
+
 _ROWS: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "image": (np.uint8, IMAGE_SHAPE),
     "q": (np.float32, ("d",)),
@@ -64,6 +101,8 @@ _ROWS: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "q_toggle": (np.float32, ("d",)),
     "gripper_toggle": (np.uint8, ()),
     "q_goal": (np.float32, ("d",)),
+    "action_q": (np.float32, ("d",)),
+    "action_gripper": (np.uint8, ()),
     "toggle": (np.int8, ()),
     "seed": (np.int32, ()),
     "camera_error": (np.float32, (5,)),
@@ -76,17 +115,30 @@ _ROWS: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "episode_failure": (np.str_, ()),
 }
 """Types and shapes of rows; d joints."""
-_TABLES = (Shard._fields[:11], Shard._fields[11:13], Shard._fields[13:])
+_TABLES = {
+    Shard: (Shard._fields[:11], Shard._fields[11:13], Shard._fields[13:]),
+    TimedShard: (TimedShard._fields[:8], TimedShard._fields[8:]),
+}
+"""Columns of one length."""
 
 
 def as_shard(**columns: np.ndarray | list) -> Shard:
     """Casts columns to the schema's types, fills the empty ones' shapes, and checks."""
-    joints = np.shape(columns["path_q"])[-1]
-    cast = {
-        name: np.asarray(columns[name], dtype).reshape(-1, *_row(name, joints))
-        for name, (dtype, _) in _ROWS.items()
+    return check_shard(Shard(**_cast(columns, np.shape(columns["path_q"])[-1])))
+
+
+def as_timed_shard(joints: int, **columns: np.ndarray | list) -> TimedShard:
+    """The same of whole episodes, of an arm with so many joints."""
+    return check_shard(TimedShard(**_cast(columns, joints)))
+
+
+def _cast(
+    columns: Mapping[str, np.ndarray | list], joints: int
+) -> dict[str, np.ndarray]:
+    return {
+        name: np.asarray(column, _ROWS[name][0]).reshape(-1, *_row(name, joints))
+        for name, column in columns.items()
     }
-    return check_shard(Shard(**cast))
 
 
 def _row(name: str, joints: int) -> tuple[int, ...]:
@@ -94,11 +146,11 @@ def _row(name: str, joints: int) -> tuple[int, ...]:
     return tuple(joints if size == "d" else size for size in _ROWS[name][1])
 
 
-def check_shard(shard: Shard) -> Shard:
-    """Returns `shard` unchanged, or raises DataError naming the first bad column."""
-    joints = shard.path_q.shape[-1]
-    for name, (dtype, _) in _ROWS.items():
-        column, row = getattr(shard, name), _row(name, joints)
+def check_shard(shard: Any) -> Any:
+    """Returns a shard of any kind unchanged, or raises DataError naming the first bad column."""
+    joints = shard.q.shape[-1]
+    for name, column in shard._asdict().items():
+        dtype, row = _ROWS[name][0], _row(name, joints)
         if not np.issubdtype(column.dtype, dtype) or column.shape[1:] != row:
             raise DataError(
                 f"{name} is {column.dtype}{list(column.shape)}, "
@@ -106,28 +158,50 @@ def check_shard(shard: Shard) -> Shard:
             )
         if dtype is np.float32 and not np.isfinite(column).all():
             raise DataError(f"{name} holds a value that is not finite")
-    for table in _TABLES:
+    for table in _TABLES[type(shard)]:
         if len({len(getattr(shard, name)) for name in table}) > 1:
             raise DataError(f"columns of different lengths: {', '.join(table)}")
     for name, low, high in (
         ("gripper", 0, 1),
         ("gripper_toggle", 0, 1),
+        ("action_gripper", 0, 1),
         ("toggle", 0, len(TOGGLES) - 1),
-        ("path", NO_PATH, len(shard.path_q) - 1),
+        ("path", NO_PATH, len(getattr(shard, "path_q", ())) - 1),
     ):
-        column = getattr(shard, name)
+        column = getattr(shard, name, np.zeros(0))
         if column.size and (column.min() < low or column.max() > high):
             raise DataError(f"{name} leaves [{low}, {high}]")
     return shard
 
 
-def concatenate(shards: list[Shard]) -> Shard:
-    """One shard of all rows; `path` is shifted to the joint path table."""
+def concatenate(shards: list[Any]) -> Any:
+    """One shard of all rows; `path` is shifted to the joint path table.
+
+    Shards are taken off the list column by column, so that pictures are never there twice.
+    """
     if not shards:
         raise DataError("no shards")
-    columns, rows = [], 0
-    for shard in shards:
-        path = np.where(shard.path == NO_PATH, NO_PATH, shard.path + rows)
-        columns.append(shard._replace(path=path.astype(np.int32)))
-        rows += len(shard.path_q)
-    return Shard(*(np.concatenate(column) for column in zip(*columns, strict=True)))
+    kind, rows = type(shards[0]), 0
+    columns: dict[str, list[np.ndarray]] = {name: [] for name in kind._fields}
+    while shards:
+        for name, column in shards.pop(0)._asdict().items():
+            if name == "path":
+                column = np.where(column == NO_PATH, NO_PATH, column + rows)
+            columns[name].append(column.astype(np.int32) if name == "path" else column)
+        rows += len(columns.get("path_q", [()])[-1])
+    return kind(**{name: _joined(parts) for name, parts in columns.items()})
+
+
+def _joined(parts: list[np.ndarray]) -> np.ndarray:
+    """All rows of one column; the parts are let go as they are copied."""
+    if len(parts) == 1:
+        return parts[0]
+    if parts[0].dtype.kind == "U":  # texts of any length
+        return np.concatenate(parts)
+    whole = np.empty((sum(map(len, parts)), *parts[0].shape[1:]), parts[0].dtype)
+    first = 0
+    while parts:
+        part = parts.pop(0)
+        whole[first : first + len(part)] = part
+        first += len(part)
+    return whole

@@ -7,12 +7,22 @@ on its arrays only, so a collection that was killed and resumed equals one that 
 import json
 import os
 from collections.abc import Collection, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from jaxplan.data.files import sha256, write_atomic, write_npz
-from jaxplan.data.schema import DataError, Shard, check_shard, concatenate
+from jaxplan.data.schema import (
+    KINDS,
+    DataError,
+    Demonstrations,
+    Shard,
+    TimedShard,
+    check_shard,
+    concatenate,
+)
 
 MANIFEST = "manifest.json"
 
@@ -22,21 +32,22 @@ def shard_path(directory: str | os.PathLike, index: int) -> Path:
     return Path(directory) / f"shard_{index:05d}.npz"
 
 
-def write_shard(path: str | os.PathLike, shard: Shard) -> None:
+def write_shard(path: str | os.PathLike, shard: Demonstrations) -> None:
     """Writes a checked shard; the same arrays give the same bytes."""
     write_npz(path, check_shard(shard)._asdict())
 
 
-def read_shard(path: str | os.PathLike) -> Shard:
-    """Reads and checks a shard.
+def read_shard(path: str | os.PathLike) -> Any:
+    """Reads and checks a shard, of the kind that it is.
 
     Raises:
         DataError: The file is missing, truncated, altered, or not a shard.
     """
     try:
         with np.load(path, allow_pickle=False) as archive:
-            shard = Shard(**{name: archive[name] for name in archive.files})
-        return check_shard(shard)
+            found = {name: archive[name] for name in archive.files}
+        kind = next(kind for kind in KINDS if {*kind._fields} == {*found})
+        return check_shard(kind(**found))
     except FileNotFoundError:
         raise DataError(f"missing shard: {path}") from None
     except Exception as error:  # a broken archive raises nearly anything
@@ -44,14 +55,25 @@ def read_shard(path: str | os.PathLike) -> Shard:
         raise DataError(f"damaged shard: {path} ({reason})") from None
 
 
-def read_demonstrations(directory: str | os.PathLike) -> Shard:
+def read_demonstrations(directory: str | os.PathLike, kind: type = Shard) -> Any:
     """All shards of a finished collection, verified against its manifest.
 
     Raises:
-        DataError: No such directory, no manifest, or a shard is missing or damaged.
+        DataError: No such directory, no manifest, a shard is missing or damaged, or these are
+            demonstrations of another kind.
     """
-    names = verify(directory)["shards"]
-    return concatenate([read_shard(Path(directory) / name) for name in names])
+    paths = [Path(directory) / name for name in verify(directory)["shards"]]
+    with ThreadPoolExecutor() as pool:
+        shards = list(pool.map(read_shard, paths))
+    if any(type(shard) is not kind for shard in shards):
+        raise DataError(f"{directory} has no {_NEEDED[kind]}")
+    return concatenate(shards)
+
+
+_NEEDED = {
+    Shard: "frames with subgoals: collect them without --timed",
+    TimedShard: "timed demonstrations: collect them with --timed",
+}
 
 
 def write_manifest(directory: str | os.PathLike, settings: Mapping) -> dict:

@@ -4,3 +4,4 @@ from jaxplan.demonstrations.expert import DemonstrationConfig as DemonstrationCo
 from jaxplan.demonstrations.expert import ExpertAgent as ExpertAgent
 from jaxplan.demonstrations.recorder import Recorder as Recorder
 from jaxplan.demonstrations.relabel import Relabeler as Relabeler
+from jaxplan.demonstrations.timed import TimedRecorder as TimedRecorder

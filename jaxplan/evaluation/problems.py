@@ -12,7 +12,6 @@ from typing import NamedTuple
 import jax
 import numpy as np
 
-from jaxplan.algorithm1 import phase_keys
 from jaxplan.collision import World
 from jaxplan.data import (
     MANIFEST,
@@ -23,6 +22,7 @@ from jaxplan.data import (
     verify,
     write_npz,
 )
+from jaxplan.episodes import phase_keys
 
 
 class RecordedProblems(NamedTuple):

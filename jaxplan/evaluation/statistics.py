@@ -1,9 +1,10 @@
 """Intervals for what was counted or measured."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
+from scipy.stats import binomtest
 
 
 def wilson(successes: int, trials: int, z: float = 1.959964) -> tuple[float, float]:
@@ -77,3 +78,15 @@ def ratio_of_means(
 
     value = float(ratio(np.ones((1, len(total))))[0])
     return value, *bootstrap(ratio, groups)
+
+
+def mcnemar(first: Sequence[bool], second: Sequence[bool]) -> dict[str, float]:
+    """McNemar's exact test of two agents in the same episodes, two-sided.
+
+    Returns:
+        In how many only the first succeeded (`only_first`), in how many only the second, and `p`.
+    """
+    pairs = list(zip(first, second, strict=True))
+    one, other = pairs.count((True, False)), pairs.count((False, True))
+    p = float(binomtest(one, one + other).pvalue) if one + other else 1.0
+    return {"only_first": one, "only_second": other, "p": p}

@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import partial
+from functools import lru_cache, partial
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -78,6 +78,7 @@ def fit(
     gather: Callable[[np.ndarray], Any],
     validate: Callable[[Params], Metrics],
     origin: Mapping[str, Any] = MappingProxyType({}),
+    export: Callable[[int, Params, Metrics], None] | None = None,
 ) -> tuple[TrainState, Metrics]:
     """Trains from the run's newest checkpoint, or from `params`, to `config.steps`.
 
@@ -93,6 +94,7 @@ def fit(
         gather: Rows [batch_size] to the batch that `loss` takes.
         validate: Metrics of the averaged weights on what was held out.
         origin: Checksums of all that the weights come from, beside the settings.
+        export: Called with the step, the averaged weights and their metrics at each validation.
 
     Returns:
         The final state and its validation metrics.
@@ -150,6 +152,8 @@ def fit(
                         {"step": done, **{f"val_{k}": v for k, v in measured.items()}},
                     )
                     logger.info("step %d: %s", done, _line(measured))
+                    if export is not None:
+                        export(done, state.ema_params, measured)
                 if done % config.checkpoint_every == 0 or last_step:
                     _check_finite(float(metrics["loss"]), done)
                     if not _all_finite(state):
@@ -168,8 +172,14 @@ def rows_of_step(config: TrainConfig, rows: np.ndarray, step: int) -> np.ndarray
     """
     size = min(config.batch_size, len(rows))
     epoch, position = divmod(step, len(rows) // size)
-    order = np.random.default_rng([config.seed, epoch]).permutation(len(rows))
+    order = _order(config.seed, epoch, len(rows))
     return rows[order[position * size : (position + 1) * size]]
+
+
+@lru_cache(maxsize=2)
+def _order(seed: int, epoch: int, rows: int) -> np.ndarray:
+    """An epoch's permutation."""
+    return np.random.default_rng([seed, epoch]).permutation(rows)
 
 
 def held_out(seeds: np.ndarray, fraction: float) -> np.ndarray:

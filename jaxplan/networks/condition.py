@@ -9,8 +9,8 @@ import jax.numpy as jnp
 
 from jaxplan.networks.joints import normalize
 from jaxplan.networks.mish import mish
-from jaxplan.networks.predictor import state_vector
 from jaxplan.networks.resnet import Encoder, EncoderConfig
+from jaxplan.networks.sight import state_vector
 from jaxplan.ranges import Checked, Count, NotNegative, Number, Positive
 from jaxplan.robots.panda.limits import Q_MAX, Q_MIN
 

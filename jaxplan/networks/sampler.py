@@ -71,7 +71,10 @@ class SamplerNetwork(nn.Module):
         """eps for x_t [..., size], with film broadcastable to [..., F]."""
         sizes = self.denoiser.film_sizes
         ends = [sum(sizes[: i + 1]) for i in range(len(sizes) - 1)]
-        return self.denoiser(x_t, jnp.split(film, ends, axis=-1))
+        films = jnp.split(film, ends, axis=-1)
+        if self.config.denoiser == "unet1d":  # a channel of so many numbers
+            return self.denoiser(x_t[..., None], films)[..., 0]
+        return self.denoiser(x_t, films)
 
     def __call__(self, x_t: jax.Array, t: jax.Array, cond: Cond) -> jax.Array:
         """eps for x_t [..., size], t [...] and conditions [...]."""

@@ -16,16 +16,18 @@ from typing import Any
 import jax
 import numpy as np
 
+from jaxplan import policies
 from jaxplan.config import from_dict
 from jaxplan.data import IMAGE_SHAPE, sha256, write_atomic, write_npz
 from jaxplan.learning.weights import NoWeights, Weights, WeightsError
-from jaxplan.networks import Predictor, PredictorConfig
+from jaxplan.networks import PolicyConfig, Predictor, PredictorConfig
+from jaxplan.policies import POLICIES
 from jaxplan.samplers import FAMILIES, init
 
 DIRECTORY = Path(__file__).parent
 """The weights that the package ships, those of other scenes in directories inside."""
 UPPER = "predictor"
-"""The upper network's name; the others are sampler families."""
+"""The upper network's name; the others are sampler families and policies."""
 MANIFEST = "manifest.json"
 
 
@@ -36,7 +38,7 @@ def shipped(variant: str = "plain") -> Path:
 
 def config_class(name: str) -> type:
     """The settings of a network's weights, by the network's name."""
-    return PredictorConfig if name == UPPER else FAMILIES[name].config
+    return PredictorConfig if name == UPPER else (FAMILIES | POLICIES)[name].config
 
 
 def save_weights(
@@ -46,7 +48,7 @@ def save_weights(
 
     Args:
         directory: Where; made if it does not exist.
-        name: `predictor`, or of a sampler family.
+        name: `predictor`, or of a sampler family or a policy.
         params: Nested dict of arrays. What only training needs is left out.
         config: The network's config.
         info: What else the manifest should say; must be JSON.
@@ -130,6 +132,8 @@ def _shapes(config: Any, flat: dict[str, np.ndarray]) -> dict[str, tuple[int, ..
             q = np.zeros((1, len(config.q_min)), np.float32)
             image = np.zeros((1, *IMAGE_SHAPE), np.uint8)
             return Predictor(config).init(key, image, q, q[:, 0])  # pyright: ignore
+        if isinstance(config, PolicyConfig):
+            return policies.init(config, key)
         own = not norms or config.encoder is not None
         return init(config, key, IMAGE_SHAPE if own else flat[norms[0]].shape, False)
 

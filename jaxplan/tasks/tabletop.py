@@ -29,6 +29,8 @@ ONE = "one"
 """Of objects: the same in all episodes."""
 RETREAT = 0.10
 """How far the hand backs off along its own axis after a release [m]."""
+AWAY = 0.07
+"""So far from where it released, it opens all the way [m]."""
 
 
 def full_name(task: str, variant: str) -> str:
@@ -95,8 +97,8 @@ class Tabletop(ABC):
         self.object_slice = slice(start, start + 7)
         """Where qpos holds the object's position and quaternion."""
         self._velocity = int(model.jnt_dofadr[model.body_jntadr[self._body]])
-        self._narrow = np.zeros(batch, bool)
-        """Grippers that have released and are not open all the way."""
+        self._released: list[np.ndarray | None] = [None] * batch
+        """Where grippers have released that are not open all the way, `[3]` [m]."""
         self._allowed = {
             key: self.planning_scene.ignored(names) for key, names in allowed.items()
         }
@@ -173,7 +175,7 @@ class Tabletop(ABC):
         data = self.sim.data[lane]
         mujoco.mj_resetDataKeyframe(data.model, data, 0)
         data.qpos[self.object_slice] = from_matrix(pose)
-        self.closed[lane] = self._narrow[lane] = False
+        self.closed[lane], self._released[lane] = False, None
 
     def object_pose(self, lane: int) -> np.ndarray:
         """Of the object in the world, `[4, 4]`.
@@ -214,6 +216,15 @@ class Tabletop(ABC):
             data.qpos[self.object_slice] = from_matrix(pose)
         mujoco.mj_forward(data.model, data)
         return self.eyes.picture(lane, data), np.asarray(q, np.float32)
+
+    def picture_of(self, lane: int, qpos: np.ndarray) -> np.ndarray:
+        """What the camera sees of a state `[nq]` that the lane's episode has been in."""
+        model = self.sim.data[lane].model
+        data = mujoco.MjData(model)
+        data.qpos[:] = qpos
+        for step in mujoco.mj_kinematics, mujoco.mj_comPos, mujoco.mj_camlight:
+            step(model, data)
+        return self.eyes.picture(lane, data)
 
     def hand_pose(self, data: mujoco.MjData) -> np.ndarray:
         """Pose of the hand's frame in the world, `[4, 4]`."""
@@ -297,18 +308,23 @@ class Tabletop(ABC):
         return toggled
 
     def _follow(self, lane: int, q: np.ndarray, settle: float) -> None:
-        """Executes commands `[T, d]`, if they are a motion; released fingers then open wide."""
+        """Executes commands `[T, d]`, if they are a motion.
+
+        Fingers that have released then open wide, if the hand is away from there.
+        """
         if len(q) < 2:
             return
         self.sim.follow(lane, q, settle)
-        if self._narrow[lane]:
+        released = self._released[lane]
+        if released is not None and np.linalg.norm(self.tcp(lane) - released) > AWAY:
             self.sim.open_wide(lane)
-            self._narrow[lane] = False
+            self._released[lane] = None
 
     def _toggle(self, lane: int, close: bool) -> None:
         """Toggles a gripper, ramped."""
         (self.sim.close if close else self.sim.open)(lane)
-        self.closed[lane], self._narrow[lane] = close, not close
+        self.closed[lane] = close
+        self._released[lane] = None if close else self.tcp(lane).copy()
 
     def _blank(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         lanes = self.batch
