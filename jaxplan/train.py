@@ -7,12 +7,9 @@ Trains one network from demonstrations to exported weights. Started again, it go
 the run's newest checkpoint. `--help` lists every setting.
 """
 
-import argparse
 import dataclasses
-import difflib
 import hashlib
 import logging
-import runpy
 import sys
 from functools import partial
 from pathlib import Path
@@ -21,10 +18,10 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
-import tyro
 
 from jaxplan import data, learning, pretrained
 from jaxplan.learning import policy, predictor, sampler, segments
+from jaxplan.learning.command_line import UsageError, parse
 from jaxplan.learning.loop import TrainConfig
 from jaxplan.learning.policy import PolicyTraining
 from jaxplan.learning.predictor import PredictorTraining
@@ -43,10 +40,6 @@ RUNS = Path("runs")
 logger = logging.getLogger(__name__)
 
 
-class UsageError(ValueError):
-    """The command line or the config file is wrong."""
-
-
 def kinds() -> dict[str, type]:
     """What can be trained, and the class of its settings."""
     learned = (*FAMILIES.values(), *POLICIES.values())
@@ -59,7 +52,7 @@ def main(arguments: list[str] | None = None) -> int:
     logging.basicConfig(level=logging.INFO, format="%(message)s", force=True)
     logging.getLogger("absl").setLevel(logging.WARNING)
     try:
-        config = parse(sys.argv[1:] if arguments is None else arguments)
+        config = parse(sys.argv[1:] if arguments is None else arguments, kinds())
         data.check_writable(RUNS, True, "the directory of runs,")
         data.check_writable(config.out or RUNS, True, "--out")
         if isinstance(config, PredictorTraining):
@@ -91,36 +84,6 @@ def main(arguments: list[str] | None = None) -> int:
             raise
         print(f"error: {error}", file=sys.stderr)
         return BAD_INPUT
-
-
-def parse(arguments: list[str]) -> Training:
-    """The config file's settings with the command line's on top."""
-    first = argparse.ArgumentParser(prog="jaxplan.train", add_help=False)
-    first.add_argument("kind", nargs="?")
-    first.add_argument("--config")
-    chosen, rest = first.parse_known_args(arguments)
-    known = kinds()
-    if chosen.kind not in known:
-        raise UsageError(f"train what? {', '.join(known)} (got {chosen.kind!r})")
-    default = known[chosen.kind]()
-    if chosen.config is not None:
-        default = _read_config(chosen.config, chosen.kind)
-    config, unknown = tyro.cli(
-        known[chosen.kind],
-        prog=f"python -m jaxplan.train {chosen.kind} [--config FILE]",
-        description="FILE is a Python program, which is run: take only what you trust.",
-        default=default,
-        args=rest,
-        return_unknown_args=True,
-        # `encoder: EncoderConfig | None` keeps the kind that the config file gives it.
-        config=(tyro.conf.AvoidSubcommands,),
-    )
-    if unknown:
-        flags = _flags(default)
-        near = difflib.get_close_matches(unknown[0].split("=")[0], flags, 1, 0.5)
-        hint = f"; did you mean {near[0]}?" if near else "; see --help"
-        raise UsageError(f"unknown setting {unknown[0]}{hint}")
-    return config
 
 
 def train_predictor(config: PredictorTraining) -> Path:
@@ -309,35 +272,6 @@ def _export(
         training.pop(paths, None)  # the checksums say it without a machine's paths
     info = {"metrics": metrics, "training": training, **origin}
     return pretrained.save_weights(directory, kind, params, config.network, info)
-
-
-def _read_config(path: str, kind: str) -> Training:
-    """The variable named `kind` of a config file."""
-    if not Path(path).is_file():
-        near = difflib.get_close_matches(
-            Path(path).stem, [p.stem for p in Path(path).parent.glob("*.py")], 1
-        )
-        hint = f"; did you mean {Path(path).with_name(near[0])}.py?" if near else ""
-        raise UsageError(f"no such config: {path}{hint}")
-    try:
-        config: Any = runpy.run_path(path).get(kind)
-    except Exception as error:  # a config is a program, and may fail in any way
-        said = (str(error) or "no reason given").splitlines()[0]
-        raise UsageError(f"{path}: {type(error).__name__}: {said}") from None
-    if not isinstance(config, kinds()[kind]):
-        raise UsageError(f"{path} defines no `{kind} = {kinds()[kind].__name__}(...)`")
-    return config
-
-
-def _flags(config: Any, prefix: str = "--") -> list[str]:
-    flags = []
-    for field in dataclasses.fields(config):
-        name = f"{prefix}{field.name.replace('_', '-')}"
-        value = getattr(config, field.name)
-        if dataclasses.is_dataclass(value):
-            flags += _flags(value, f"{name}.")
-        flags.append(name)
-    return flags
 
 
 if __name__ == "__main__":

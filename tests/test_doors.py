@@ -33,6 +33,7 @@ from jaxplan import (
 from jaxplan import make_world as world_for
 from jaxplan.episodes import EpisodeConfig
 from jaxplan.learning import SegmentTraining, TrainConfig
+from jaxplan.learning.policy import PolicyTraining
 from jaxplan.motion.blocks import SIZES
 from jaxplan.motion.checks import seeds_of
 from jaxplan.motion.goals import Goals
@@ -56,7 +57,7 @@ ARM = """
 </mujoco>
 """
 LEFT, RIGHT, HIT = [-0.5, 0.0], [0.5, 0.0], [0.0, 0.0]
-ABSTRACT = TrainConfig, SegmentTraining
+ABSTRACT = TrainConfig, SegmentTraining, PolicyTraining
 SMALL = PlannerConfig(max_expansions=500)
 
 

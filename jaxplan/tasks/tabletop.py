@@ -8,7 +8,6 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
-import jax.numpy as jnp
 import mujoco
 import numpy as np
 
@@ -18,10 +17,11 @@ from jaxplan.config import PAPER_PLANNER
 from jaxplan.motion import MotionPlanner
 from jaxplan.robots import Robot
 from jaxplan.robots.kinematics import InverseKinematics
-from jaxplan.scene import Scene
 from jaxplan.simulation.physics import Simulator
+from jaxplan.tasks.execution import Execution
 from jaxplan.tasks.eyes import Eyes
 from jaxplan.tasks.perturbation import NOMINAL, Perturbation
+from jaxplan.tasks.planned import Planned, stacked
 from jaxplan.tasks.poses import from_matrix, to_matrix
 from jaxplan.tasks.watch import Watch
 
@@ -29,8 +29,6 @@ ONE = "one"
 """Of objects: the same in all episodes."""
 RETREAT = 0.10
 """How far the hand backs off along its own axis after a release [m]."""
-AWAY = 0.07
-"""So far from where it released, it opens all the way [m]."""
 
 
 def full_name(task: str, variant: str) -> str:
@@ -79,15 +77,11 @@ class Tabletop(ABC):
         self.name, self.robot, self.model, self.batch = name, robot, model, batch
         self.camera = camera
         self.sim = Simulator(robot, model, batch)
-        self.closed = np.zeros(batch, bool)
-        self.planning_scene = Scene.from_mjcf(
-            planning, shaped=[] if objects == ONE else [movable]
-        )
-        self.objects = objects
-        rows, numbers = list(self.planning_scene.shaped), self.planning_scene.model
-        own = (np.asarray(leaf)[rows] for leaf in (numbers.geom_pos, numbers.geom_size))
-        self._geoms = [tuple(own)] * batch
-        """Places and sizes of the object's geoms, as planning sees it."""
+        self._arms = Execution(self.sim, self.tcp, batch)
+        self.closed = self._arms.closed
+        shaped = [] if objects == ONE else [movable]
+        self._planned = Planned(planning, robot, allowed, shaped, batch)
+        self.planning_scene, self.objects = self._planned.scene, objects
         self.kinematics = InverseKinematics(robot, model)
         look = look or (lambda: model)
         self.eyes = Eyes(model, look, camera, image, batch, perturbation)
@@ -97,11 +91,6 @@ class Tabletop(ABC):
         self.object_slice = slice(start, start + 7)
         """Where qpos holds the object's position and quaternion."""
         self._velocity = int(model.jnt_dofadr[model.body_jntadr[self._body]])
-        self._released: list[np.ndarray | None] = [None] * batch
-        """Where grippers have released that are not open all the way, `[3]` [m]."""
-        self._allowed = {
-            key: self.planning_scene.ignored(names) for key, names in allowed.items()
-        }
 
     def draw(self, objects: str) -> None:
         """Takes other objects from the next episodes on.
@@ -165,9 +154,7 @@ class Tabletop(ABC):
         model.stat.center[:] = self.model.stat.center
         self.sim.give(lane, model)
         self.eyes.give(lane, look)
-        names = map(self.planning_scene.geom_name, self.planning_scene.shaped)
-        pos, size = zip(*(geoms[name] for name in names), strict=True)
-        self._geoms[lane] = np.array(pos, np.float32), np.array(size, np.float32)
+        self._planned.give(lane, geoms)
 
     def begin(self, lane: int, seed: int, pose: np.ndarray) -> None:
         """Arm at home, gripper open, the object at a pose `[4, 4]`."""
@@ -175,7 +162,7 @@ class Tabletop(ABC):
         data = self.sim.data[lane]
         mujoco.mj_resetDataKeyframe(data.model, data, 0)
         data.qpos[self.object_slice] = from_matrix(pose)
-        self.closed[lane], self._released[lane] = False, None
+        self._arms.begin(lane)
 
     def object_pose(self, lane: int) -> np.ndarray:
         """Of the object in the world, `[4, 4]`.
@@ -270,9 +257,7 @@ class Tabletop(ABC):
 
     def execute(self, lanes: Sequence[int], action: Action) -> np.ndarray:
         """Moves and toggles; `[B]` bool, which toggled."""
-        toggled = np.zeros(self.batch, bool)
-        toggled[list(lanes)] = self.sim.map(lambda e: self._run(e, action), lanes)
-        return toggled
+        return self._arms.execute(lanes, action)
 
     def wait(self, lanes: Sequence[int], seconds: float) -> None:
         """Lets time pass."""
@@ -285,46 +270,7 @@ class Tabletop(ABC):
             touching: `[B]` phases that end in a toggle or begin after one: there the held
                 object may meet or leave what it stands on, and an open hand the object.
         """
-        rows = [self._world(e, bool(touching[e])) for e in range(self.batch)]
-        leaves = (jnp.asarray(np.stack(leaf)) for leaf in zip(*rows, strict=True))
-        return World(*leaves)
-
-    def _run(self, lane: int, action: Action) -> bool:
-        """One lane's commands, to the next change of the gripper's mode and on from there."""
-        q, modes = action.q[lane], action.gripper[lane]
-        first, toggled = 0, False
-        for at in range(len(q)):
-            if bool(modes[at]) == self.closed[lane] or (
-                at and modes[at] == modes[at - 1]
-            ):
-                continue
-            self._follow(lane, q[first : at + 1], action.settle)
-            first = at
-            off = np.abs(self.sim.q(lane) - action.q_toggle[lane]).max()
-            if off < action.tolerance:
-                self._toggle(lane, bool(modes[at]))
-                toggled = True
-        self._follow(lane, q[first:], action.settle)
-        return toggled
-
-    def _follow(self, lane: int, q: np.ndarray, settle: float) -> None:
-        """Executes commands `[T, d]`, if they are a motion.
-
-        Fingers that have released then open wide, if the hand is away from there.
-        """
-        if len(q) < 2:
-            return
-        self.sim.follow(lane, q, settle)
-        released = self._released[lane]
-        if released is not None and np.linalg.norm(self.tcp(lane) - released) > AWAY:
-            self.sim.open_wide(lane)
-            self._released[lane] = None
-
-    def _toggle(self, lane: int, close: bool) -> None:
-        """Toggles a gripper, ramped."""
-        (self.sim.close if close else self.sim.open)(lane)
-        self.closed[lane] = close
-        self._released[lane] = None if close else self.tcp(lane).copy()
+        return stacked([self._world(e, bool(touching[e])) for e in range(self.batch)])
 
     def _blank(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         lanes = self.batch
@@ -337,13 +283,4 @@ class Tabletop(ABC):
         data, pose, held = self.sim.data[lane], self.object_pose(lane), self.held(lane)
         if held:
             pose = np.linalg.inv(self.hand_pose(data)) @ pose
-        fingers = data.qpos[self.robot.finger_slice]
-        return (
-            from_matrix(pose)[None].astype(np.float32),
-            np.array([held]),
-            fingers.clip(0, self.robot.gripper.open).astype(np.float32),
-            self._allowed["held" if held else "free", touching],
-            np.zeros((0, 7), np.float32),
-            np.zeros((0, 3), np.float32),
-            *self._geoms[lane],
-        )
+        return self._planned.leaves(lane, pose, held, touching, data.qpos)
