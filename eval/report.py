@@ -136,7 +136,7 @@ SECTIONS = (
         summary.speed,
     ),
 )
-MOST_LINES = 8
+MOST_LINES = 5
 """Of what is worse, in a section of RESULTS.md."""
 NOT_OURS = ("robustness_without_variation",)
 """Files that ours is compared with."""
