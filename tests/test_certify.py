@@ -140,7 +140,11 @@ FULL = """<mujoco><worldbody>
 @pytest.fixture(scope="module")
 def full() -> Scene:
     return Scene.from_mjcf(
-        FULL, joints=["x"], hand="arm", slots={"box": 1, "sphere": 1}
+        FULL,
+        joints=["x"],
+        hand="arm",
+        slots={"box": 1, "sphere": 1},
+        shaped=["mug"],
     )
 
 
@@ -148,7 +152,9 @@ def broken_worlds(scene: Scene) -> dict[str, tuple[World, str]]:
     """A world for each leaf and each of its entries that is broken, and what it breaks."""
     good = World(*map(np.asarray, make_world(scene)))
     found = {}
-    for name in ("object_pose", "passive", "slot_pose", "slot_size"):
+    shaped = [scene.geom_name(geom) for geom in scene.shaped]
+    leaves = "object_pose", "passive", "slot_pose", "slot_size", "geom_pos", "geom_size"
+    for name in leaves:
         leaf = getattr(good, name)
         for value in (np.nan, np.inf, -np.inf):
             for index in np.ndindex(leaf.shape):
@@ -158,6 +164,8 @@ def broken_worlds(scene: Scene) -> dict[str, tuple[World, str]]:
                 owner = {
                     "object_pose": scene.objects,
                     "passive": scene.passive,
+                    "geom_pos": shaped,
+                    "geom_size": shaped,
                 }.get(name, ("box0", "sphere0"))[index[0]]
                 found[f"{name}{index} {value}"] = world, owner
     for name in ("object_pose", "slot_pose"):
@@ -172,6 +180,10 @@ def broken_worlds(scene: Scene) -> dict[str, tuple[World, str]]:
         size = good.slot_size.copy()
         size[index] = -0.1
         found[f"slot_size{index} negative"] = good._replace(slot_size=size), "negative"
+    for k in range(3):
+        size = good.geom_size.copy()
+        size[0, k] = -0.1
+        found[f"geom_size{k} negative"] = good._replace(geom_size=size), "negative"
     held = good._replace(held=np.array([False, True]))
     return found | {"a mocap body in the hand": (held, "ball")}
 

@@ -114,7 +114,9 @@ class Replica:
         self.counts, self._carries = counts, worlds.held.any(-1)
         # Filling slots takes as long as the rest, and mostly they stay as they are.
         given = worlds.slot_pose, worlds.slot_size, worlds.geom_pos, worlds.geom_size
-        own = np.concatenate([np.reshape(x, (len(rows), -1)) for x in given], 1)
+        own = np.concatenate(
+            [np.reshape(x, (len(rows), math.prod(np.shape(x)[1:]))) for x in given], 1
+        )
         self._fills = np.ones(len(rows), bool)
         if len(rows) > 1:
             self._fills[1:] = (own[1:] != own[:-1]).any(1)
