@@ -9,6 +9,7 @@ that is not there is a line that says which command makes it.
 import json
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -18,6 +19,7 @@ from parts.summary import PAPER_ERROR, PAPER_NOMINAL, PAPER_SUCCESS, Found, rate
 from jaxplan.cli import run_script
 from jaxplan.data import write_atomic
 from jaxplan.evaluation.tables import Table, markdown, table
+from jaxplan.pretrained.store import DIRECTORY, MANIFEST
 from jaxplan.ranges import Checked
 
 ROOT = Path(__file__).parents[1]
@@ -136,10 +138,11 @@ SECTIONS = (
         summary.speed,
     ),
 )
-MOST_LINES = 5
+MOST_LINES = 4
 """Of what is worse, in a section of RESULTS.md."""
 NOT_OURS = ("robustness_without_variation",)
 """Files that ours is compared with."""
+EARLIER = "weights that were shipped earlier"
 FIGURES = {
     "figure2.png": "Figure 2: proposals (blue) on the way to a grasp and to a release.",
     "figure3.png": "Figure 3: one episode.",
@@ -173,7 +176,8 @@ def report(results: Path = RESULTS, root: Path = ROOT) -> dict[str, str]:
         "95 % interval. Paper: Lee and Cho, Electronics 2025, 14, 4837. Each page has all tables, "
         "the commands, and what differs from the paper.\n",
     ]
-    pages = {}
+    pages: dict[str, str] = {}
+    earlier: list[str] = []
     for section in SECTIONS:
         found = {
             name: json.loads(path.read_text(encoding="utf-8"))
@@ -186,8 +190,11 @@ def report(results: Path = RESULTS, root: Path = ROOT) -> dict[str, str]:
             parts.append(_missing(section))
         elif section.summary is not None:
             parts.append(markdown(section.summary(found)))
+        earlier += [name for name in found if _is_earlier(name, found[name])]
         if worse := _worse(found):
             parts.append(_listed(worse, MOST_LINES))
+    if earlier:
+        parts[1] += f"\nMeasured with {EARLIER}: {', '.join(earlier)}.\n"
     pictures = [
         f"![{caption}](docs/figures/{name})\n\n{caption}\n"
         for name, caption in FIGURES.items()
@@ -297,6 +304,7 @@ def _origin(name: str, result: dict[str, Any]) -> str:
         versions.get("machine", ""),
         f"jaxplan {versions['jaxplan']}" if "jaxplan" in versions else "",
         "quick run" if result.get("quick") else "",
+        EARLIER if _is_earlier(name, result) else "",
     ]
     if "seeds" in settings:
         said.append(f"seeds {settings['seeds']}")
@@ -307,6 +315,21 @@ def _origin(name: str, result: dict[str, Any]) -> str:
             f"blocked, targets by the {settings['upper']}"
         )
     return "; ".join(filter(None, said)) + "\n"
+
+
+def _is_earlier(name: str, result: dict[str, Any]) -> bool:
+    """Whether it was measured with weights that are shipped no more."""
+    used = result.get("weights") or result.get("settings", {}).get("weights") or {}
+    checksums = used.values() if isinstance(used, dict) else used
+    return name not in NOT_OURS and bool({*checksums} - _shipped())
+
+
+@cache
+def _shipped() -> set[str]:
+    """Checksums of all weights that the package has."""
+    manifests = DIRECTORY.glob(f"**/{MANIFEST}")
+    read = [json.loads(path.read_text(encoding="utf-8")) for path in manifests]
+    return {entry["sha256"] for manifest in read for entry in manifest.values()}
 
 
 def _worse(found: Found) -> list[str]:
