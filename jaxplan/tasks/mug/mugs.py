@@ -27,10 +27,10 @@ class MugRange(NamedTuple):
     handle_depth: Spans
     """From the cup's outside to the handle's [m]."""
     handle_length: Spans
-    """From its upper end to its lower one [m]: pads are 17 mm high and must not touch both of
-    the arms that it hangs on, or contacts are as many as make the solver fling the mug."""
+    """From its upper end to its lower one [m]. Below 38 mm the expert lost some mugs as they were
+    lifted, with pads, 17 mm high, on the bar and on both of the arms that it hangs on."""
     mass: Spans
-    """[kg]. From 0.26 on, the widest mugs slip between fingers that hold their handle."""
+    """[kg]. From 0.26 on it dropped some of the widest after lifting them by the handle."""
     hue: Spans
     """Of the colour, 0 to 1 around the circle from red to red."""
     saturation: Spans = ((0.35, 0.9),)
