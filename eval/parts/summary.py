@@ -41,7 +41,12 @@ def robustness(found: Found) -> Table:
     weights: list[str] = []
     rows: dict[str, dict[str, list[Cell]]] = {}
     for name, result in found.items():
-        of = name.removeprefix("robustness_").removesuffix("_beyond").replace("_", " ")
+        of = (
+            name.removeprefix("robustness_")
+            .removesuffix("_beyond")
+            .removesuffix("_mugs")
+            .replace("_", " ")
+        )
         weights += [] if of in weights else [of]
         for setting, one in result["settings"].items():
             cells = [one["trials"], rate(one), one["toggle_error_nearest"]]
