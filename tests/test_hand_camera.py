@@ -79,7 +79,7 @@ def test_a_perturbed_mount_is_where_mujoco_has_it():
     for row, q in enumerate(configurations()):
         task.observe_at(0, q)
         found = camera_pose(CONFIG, jnp.asarray(q), jnp.asarray(task.eyes.error(0)))
-        look = task.eyes._look._data.camera("hand")
+        look = task.eyes._look(0)._data.camera("hand")
         np.testing.assert_allclose(found[0], look.xpos, atol=1e-5)
         np.testing.assert_allclose(found[1], look.xmat.reshape(3, 3), atol=1e-5)
         if row == 0:
