@@ -12,6 +12,7 @@ from jaxplan.demonstrations import ExpertAgent
 from jaxplan.episodes import run_episodes
 from jaxplan.evaluation.certification import Certification
 from jaxplan.robots import PANDA
+from jaxplan.robots.kinematics import InverseKinematics
 from jaxplan.scene import Scene
 from jaxplan.tasks.mug import poses, scene
 from jaxplan.tasks.mug.expert import Expert, Toggle
@@ -58,7 +59,8 @@ def lying(seed: int) -> np.ndarray:
 
 def problems(model: mujoco.MjModel, seed: int) -> list[Problem]:
     """The phases of the expert's episode, from kinematics alone."""
-    expert, data = Expert(model), mujoco.MjData(model)
+    expert = Expert(InverseKinematics(PANDA, model))
+    data = mujoco.MjData(model)
 
     def hand(q):
         data.qpos[:7] = q
