@@ -15,7 +15,7 @@ from jaxplan import diffusion as maths
 from jaxplan import learning, pretrained, train
 from jaxplan.learning import loop, sampler
 from jaxplan.pretrained import shipped
-from jaxplan.samplers import cvae, diffusion, few_step, gan, init
+from jaxplan.samplers import FAMILIES, cvae, diffusion, few_step, gan, init
 
 CONFIGS = Path(__file__).parents[1] / "configs"
 DEBUG = runpy.run_path(str(CONFIGS / "debug.py"))
@@ -166,7 +166,7 @@ def test_weights_of_another_task_camera_or_robot_are_refused():
 
 def test_shipped_weights_say_what_they_are_for():
     for variant, task in (("plain", "mug"), ("cluttered", "mug_cluttered")):
-        for name in train.kinds():
+        for name in ("predictor", *FAMILIES):
             info = pretrained.load_weights(name, shipped(variant)).info
             assert (info["cameras"], info["robots"]) == (["hand"], ["panda"])
             assert task in info["tasks"]
