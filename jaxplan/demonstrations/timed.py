@@ -14,15 +14,12 @@ from typing import Any
 import numpy as np
 
 from jaxplan.base import Phase
-from jaxplan.data import FRAME_PERIOD, TimedShard, as_timed_shard
+from jaxplan.data import TimedShard, as_timed_shard
 from jaxplan.demonstrations.expert import ExpertAgent
 from jaxplan.demonstrations.recorder import episode_columns
 from jaxplan.episodes import EpisodeRecord
-from jaxplan.simulation.physics import CONTROL_PERIOD
+from jaxplan.policies.drive import TICKS
 from jaxplan.tasks import Tabletop
-
-TICKS = round(FRAME_PERIOD / CONTROL_PERIOD)
-"""Control periods from a frame to the next."""
 
 
 class TimedRecorder:

@@ -15,6 +15,7 @@ from jaxplan.robots import Robot
 from jaxplan.simulation.physics import CONTROL_PERIOD
 
 TICKS = round(FRAME_PERIOD / CONTROL_PERIOD)
+"""Control periods from a frame, or an action, to the next."""
 RETREAT_SECONDS = 1.5
 """Of the last motion, which a policy does not decide."""
 
