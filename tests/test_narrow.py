@@ -89,7 +89,7 @@ def shapes(model: mujoco.MjModel, name: str, poses: np.ndarray) -> Shapes:
         name: Of the geom and its body.
         poses: `[B, 3, 4]` of its body.
     """
-    scene: Any = SimpleNamespace(model=model, mj_model=model)
+    scene: Any = SimpleNamespace(model=model, mj_model=model, shaped=())
     own = read(scene, (model.geom(name).id,))
     if own.hulls:
         fill = [(0, 0), (0, VERTICES - own.hulls.vertices.shape[1])]
