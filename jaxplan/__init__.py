@@ -1,5 +1,7 @@
 """Motion planning in JAX for MuJoCo models, guided by learned samplers."""
 
+from typing import TYPE_CHECKING, Any
+
 import jaxplan.interrupt
 
 # Before the rest, whose import takes seconds, and imports MuJoCo.
@@ -18,4 +20,16 @@ from jaxplan.planning import Segment as Segment
 from jaxplan.planning import Status as Status
 from jaxplan.scene import Scene as Scene
 
+if TYPE_CHECKING:
+    from jaxplan.pretrained import load_sampler as load_sampler
+
 __version__ = "0.1.0"
+
+
+def __getattr__(name: str) -> Any:
+    """What needs Flax comes when it is asked for: who plans without networks waits less."""
+    if name == "load_sampler":
+        from jaxplan.pretrained import load_sampler
+
+        return load_sampler
+    raise AttributeError(f"module 'jaxplan' has no attribute {name!r}")

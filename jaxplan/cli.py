@@ -60,6 +60,43 @@ class PlanCommand:
     """Of each joint at most [rad/s^2 or m/s^2]."""
     time_limit: float | None = None
     """After so long the search gives up [s]."""
+    obstacles: Path | None = None
+    """JSON file with obstacles that the model does not have, and objects that stand elsewhere:
+    {"obstacles": [{"kind": "box", "size": [...], "pose": [...]}], "objects": {"cup": [...]}}."""
+    sampler: Path | None = None
+    """Directory with a sampler's weights, trained for this scene by `jaxplan record` and
+    `python -m jaxplan.train scene_sampler`."""
+
+
+@dataclass(frozen=True)
+class RecordCommand:
+    """Solves problems in a robot's cell, several ways each, for a sampler to learn from.
+
+    A run that was killed goes on where it was, to the same bytes. Exit code 0 if anything was
+    solved, 1 if not, 2 for bad input.
+    """
+
+    scene: Positional[Path]
+    """MJCF file."""
+    out: Path
+    """Directory of the shards."""
+    problems: Path | None = None
+    """JSON file: {"problems": [...]}, or ranges within which problems are drawn
+    (docs/sampler.md); by default any start and goal among what the model has."""
+    count: int | None = None
+    """How many problems are drawn, or taken of those given."""
+    ways: int = 4
+    """Paths of each problem."""
+    seed: int = 0
+    """Of problems and searches."""
+    expansions: int = 2000
+    """Of each search, all of which are used: the more, the shorter the paths."""
+    margin: float = 0.0
+    """Clearance of the paths [m]."""
+    joints: str | None = None
+    """The arm's joints, with commas between them; by default the chain before the fingers."""
+    hand: str | None = None
+    """The arm's last body; by default the last before the fingers."""
 
 
 @dataclass(frozen=True)
@@ -80,7 +117,12 @@ class CheckCommand:
     """The arm's last body; by default the last before the fingers."""
 
 
-COMMANDS = {"plan": PlanCommand, "check": CheckCommand, "solve": SolveCommand}
+COMMANDS = {
+    "plan": PlanCommand,
+    "check": CheckCommand,
+    "record": RecordCommand,
+    "solve": SolveCommand,
+}
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -157,6 +199,28 @@ def _plan(command: PlanCommand) -> int:
     return 0 if plan(given.pop("scene"), **given) else 1
 
 
+def _record(command: RecordCommand) -> int:
+    _check_seed(command.seed)
+    _check_out(command.out)
+    _keep_compiled()
+    import dataclasses
+
+    from jaxplan.cells import RecordConfig
+    from jaxplan.commands.record import record
+    from jaxplan.ranges import Count, check
+
+    if command.count is not None:
+        check("count", command.count, Count)
+    usual = RecordConfig()
+    planner = dataclasses.replace(
+        usual.planner, max_expansions=command.expansions, margin=command.margin
+    )
+    config = RecordConfig(command.ways, command.seed, usual.shard_size, planner)
+    names = "problems", "count", "out", "joints", "hand"
+    given = {name: getattr(command, name) for name in names}
+    return 0 if record(command.scene, **given, config=config) else 1
+
+
 def _check(command: CheckCommand) -> int:
     from jaxplan.commands.check import check
 
@@ -181,7 +245,12 @@ def _solve(command: SolveCommand) -> int:
 
 
 # They import when they run, so that `--help` and a typo answer at once.
-RUN = {PlanCommand: _plan, CheckCommand: _check, SolveCommand: _solve}
+RUN = {
+    PlanCommand: _plan,
+    CheckCommand: _check,
+    RecordCommand: _record,
+    SolveCommand: _solve,
+}
 
 
 def _check_seed(seed: int) -> None:

@@ -104,8 +104,8 @@ def test_coding_is_inverted():
 def test_a_base_is_coded_beside_the_arm():
     q, base = jax.random.normal(jax.random.key(1), (2, 4, 7))
     segment = jnp.zeros((4, 8))
-    x_0 = jnp.concatenate([segment, diffusion.encode_base(base, q)], axis=-1)
-    np.testing.assert_allclose(diffusion.decode_base(x_0, q), base, atol=1e-6)
+    x_0 = jnp.concatenate([segment, diffusion.encode_base(base, q, 0.7)], axis=-1)
+    np.testing.assert_allclose(diffusion.decode_base(x_0, q, 0.7), base, atol=1e-6)
     assert diffusion.bounds(7, base=True).shape == x_0.shape[1:]
 
 

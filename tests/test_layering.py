@@ -21,7 +21,7 @@ LAYERS = (
     {"policies", "samplers"},
     {"pretrained", "tasks"},
     {"algorithm1"},
-    {"demonstrations", "learned", "pictures"},
+    {"cells", "demonstrations", "learned", "pictures", "trainings"},
     {"evaluation"},
     {"commands", "solve", "train", "__init__"},
     {"cli"},
@@ -36,7 +36,14 @@ HOMES = {
     "orbax": ("learning/checkpoint.py",),
 }
 OUTSIDE = {"train", "eval", "configs", "tests"}
-PRINTING = ("cli.py", "commands/check.py", "commands/plan.py", "solve.py", "train.py")
+PRINTING = (
+    "cli.py",
+    "commands/check.py",
+    "commands/plan.py",
+    "commands/record.py",
+    "solve.py",
+    "train.py",
+)
 
 FILES = sorted(file.relative_to(PACKAGE).as_posix() for file in PACKAGE.rglob("*.py"))
 

@@ -34,6 +34,7 @@ from jaxplan.learning import (
 from jaxplan.learning.train_state import ema_decay, init_state, optimizer
 from jaxplan.networks import Prediction
 from jaxplan.pretrained import store
+from jaxplan.trainings import trainings
 
 CONFIGS = Path(__file__).parents[1] / "configs"
 
@@ -293,10 +294,9 @@ def test_weights_round_trip_and_damage(tmp_path):
 
 
 def test_configs_survive_json():
-    for kind in train.kinds().values():
-        config = kind()
-        values = json.loads(json.dumps(dataclasses.asdict(config)))
-        assert from_dict(kind, values) == config
+    for kind in trainings().values():
+        values = json.loads(json.dumps(dataclasses.asdict(kind.settings)))
+        assert from_dict(type(kind.settings), values) == kind.settings
     with pytest.raises(ValueError, match="has no colour"):
         from_dict(LossConfig, {"colour": 1})
 

@@ -27,6 +27,7 @@ from jaxplan.networks.mixture import Mixture
 from jaxplan.policies import POLICIES, Drive, Policy, PolicyAgent, Step
 from jaxplan.pretrained import load_weights
 from jaxplan.robots import PANDA
+from jaxplan.trainings import files
 
 CONFIGS = Path(__file__).parents[1] / "configs"
 CONFIG = PolicyConfig(history=3, horizon=4, executed=2)
@@ -169,7 +170,7 @@ POLICY = Policy("line", LineConfig, LineTraining, Line, act, loss)
 @pytest.fixture
 def line(monkeypatch, timed_demos, tmp_path):
     monkeypatch.setitem(POLICIES, "line", POLICY)
-    monkeypatch.setattr(train, "RUNS", tmp_path)
+    monkeypatch.setattr(files, "RUNS", tmp_path)
     out = ["--data", timed_demos, "--steps", "20", "--out", str(tmp_path / "w")]
     assert train.main(["line", *out]) == 0
     return load_weights("line", tmp_path / "w")
@@ -196,13 +197,13 @@ def test_weights_of_others_are_refused(line, mug_task):
     with pytest.raises(WeightsError, match="camera static, not hand"):
         PolicyAgent(mug_task, other)
     with pytest.raises(WeightsError, match="no transformer in"):
-        load_weights("transformer", train.RUNS / "w")
+        load_weights("transformer", files.RUNS / "w")
 
 
 def test_demonstrations_of_the_other_kind_are_refused(
     demos, timed_demos, tmp_path, monkeypatch, capsys
 ):
-    monkeypatch.setattr(train, "RUNS", tmp_path)
+    monkeypatch.setattr(files, "RUNS", tmp_path)
     for kind, directory, flag in (
         ("lstm_gmm", demos, "with --timed"),
         ("predictor", timed_demos, "without --timed"),
@@ -228,7 +229,7 @@ def trained(timed_demos, tmp_path_factory):
     """All three, by the debug recipe."""
     root = tmp_path_factory.mktemp("trained")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(train, "RUNS", root / "runs")
+        patch.setattr(files, "RUNS", root / "runs")
         for kind in ("diffusion_policy", "lstm_gmm", "transformer"):
             out = ["--out", str(root / "weights")]
             assert train.main([*command(kind, timed_demos), *out]) == 0
@@ -243,7 +244,7 @@ def command(kind: str, demos: str) -> list[str]:
 def test_a_killed_training_ends_with_the_same_bits(
     kind, trained, timed_demos, tmp_path, monkeypatch
 ):
-    monkeypatch.setattr(train, "RUNS", tmp_path / "runs")
+    monkeypatch.setattr(files, "RUNS", tmp_path / "runs")
     rows = loop.rows_of_step
 
     def killed(config, given, step):

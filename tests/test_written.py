@@ -15,6 +15,7 @@ from toy_training import TOY, toy
 
 from jaxplan import cli, data, learning, tasks, train
 from jaxplan.data import check_writable
+from jaxplan.trainings import files
 
 ROOT = Path(__file__).parents[1]
 CONFIGS = ROOT / "configs"
@@ -165,7 +166,7 @@ def test_directories_of_one_name_are_told_apart(tmp_path):
         data.write_shard(data.shard_path(directory, 0), shard)
         data.write_manifest(directory, {"task": "mug"})
     both = tuple(str(tmp_path / place / "mug") for place in ("a", "b"))
-    _, origin = train._read(TOY.__class__(name="toy", data=both))
+    _, origin = files.read(TOY.__class__(name="toy", data=both), data.Shard)
     assert list(origin["data"]) == ["mug", "mug (2)"]
     assert len(set(origin["data"].values())) == 2
     shutil.rmtree(tmp_path / "a")

@@ -1,7 +1,7 @@
 """A model and its poses as people name them on the command line."""
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import groupby
 from operator import itemgetter
 from pathlib import Path
@@ -29,15 +29,24 @@ class NamedPose(NamedTuple):
     """The key frame's id."""
 
 
-def read_scene(path: Path, joints: str | None, hand: str | None) -> Scene:
+def read_scene(
+    path: Path,
+    joints: str | None,
+    hand: str | None,
+    slots: Mapping[str, int] | None = None,
+) -> Scene:
     """Reads an MJCF; `joints` are names with commas between them.
 
     Raises:
         FileNotFoundError: There is no such file.
         ValueError: What is wrong in it, in one line.
     """
-    names = None if joints is None else [name.strip() for name in joints.split(",")]
-    return Scene.from_mjcf(path, names, hand)
+    return Scene.from_mjcf(path, read_joints(joints), hand, slots)
+
+
+def read_joints(joints: str | None) -> list[str] | None:
+    """Names with commas between them."""
+    return None if joints is None else [name.strip() for name in joints.split(",")]
 
 
 def read_pose(scene: Scene, text: str, role: str) -> NamedPose:

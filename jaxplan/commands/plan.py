@@ -5,19 +5,23 @@ import time
 from pathlib import Path
 from typing import Any
 
+import jax
 import numpy as np
 
-from jaxplan.collision import Certificate
+from jaxplan.cells import furnished, read_json, slots_of
+from jaxplan.collision import Certificate, World
+from jaxplan.collision.positions import qpos_rows
+from jaxplan.collision.replica import fill, mujoco_model
 from jaxplan.commands.model import (
     NamedPose,
     read_pose,
     read_scene,
-    with_joints,
     world_at,
 )
 from jaxplan.config import PlannerConfig
 from jaxplan.motion import Plan, Planner, Timed
 from jaxplan.motion.reasons import joint_distance
+from jaxplan.pretrained import load_sampler
 from jaxplan.provenance import versions
 from jaxplan.scene import Scene
 from jaxplan.simulation.camera import require_gl
@@ -39,6 +43,8 @@ def plan(
     velocity: float = 1.0,
     acceleration: float = 2.0,
     time_limit: float | None = None,
+    obstacles: Path | None = None,
+    sampler: Path | None = None,
     config: PlannerConfig = PlannerConfig(),
 ) -> bool:
     """Plans, asks C MuJoCo about path and motion, and says what came of it.
@@ -55,6 +61,8 @@ def plan(
         velocity: Of each joint at most [rad/s or m/s].
         acceleration: Of each joint at most [rad/s^2 or m/s^2].
         time_limit: Of the search [s]; None = its budget of expansions alone.
+        obstacles: JSON with obstacles and objects, see `cells.problem`.
+        sampler: Directory of weights, see `pretrained.load_sampler`.
         config: Of the planner.
 
     Returns:
@@ -66,16 +74,21 @@ def plan(
     """
     if video and out is None:
         raise ValueError("--video needs --out")
-    scene = read_scene(path, joints, hand)
+    learned = None if sampler is None else load_sampler(sampler)
+    given = {} if obstacles is None else read_json(obstacles)
+    slots = slots_of([given]) if learned is None else learned.scene["slots"]
+    scene = read_scene(path, joints, hand, slots)
     first, last = read_pose(scene, start, "start"), read_pose(scene, goal, "goal")
-    planner = Planner(scene, config, velocity=velocity, acceleration=acceleration)
+    planner = Planner(
+        scene, config, sampler=learned, velocity=velocity, acceleration=acceleration
+    )
     if video:
         require_gl()
     if out is not None:
         out.mkdir(parents=True, exist_ok=True)
         for name in (RECORD, VIDEO):  # of a run before
             (out / name).unlink(missing_ok=True)
-    world = world_at(scene, first)
+    world = furnished(scene, world_at(scene, first), given)
     began = time.perf_counter()
     planner.plan(
         first.q, first.q, seed, world
@@ -101,11 +114,19 @@ def plan(
         written[0].write_text(json.dumps(record, indent=1) + "\n")
         if video and timed is not None:
             written.append(out / VIDEO)
-            frames = np.arange(0, timed.t[-1] + 1 / FPS, 1 / FPS)
-            q = np.stack([np.interp(frames, timed.t, joint) for joint in timed.q.T], -1)
-            film_motion(written[1], scene.mj_model, with_joints(scene, first.qpos, q))
+            _film(written[1], scene, world, timed)
         print(f"written: {', '.join(map(str, written))}")
     return good
+
+
+def _film(path: Path, scene: Scene, world: World, timed: Timed) -> None:
+    """The motion, among what is there."""
+    frames = np.arange(0, timed.t[-1] + 1 / FPS, 1 / FPS)
+    q = np.stack([np.interp(frames, timed.t, joint) for joint in timed.q.T], -1)
+    model, rows = mujoco_model(scene), (len(q),)
+    fill(scene, model, world)
+    worlds = jax.tree.map(lambda leaf: np.broadcast_to(leaf, rows + leaf.shape), world)
+    film_motion(path, model, qpos_rows(scene, worlds, q))
 
 
 def _show(scene: Scene, answer: Plan) -> None:

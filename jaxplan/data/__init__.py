@@ -5,6 +5,7 @@ from jaxplan.data.files import check_writable as check_writable
 from jaxplan.data.files import sha256 as sha256
 from jaxplan.data.files import write_atomic as write_atomic
 from jaxplan.data.files import write_npz as write_npz
+from jaxplan.data.paths import resample as resample
 from jaxplan.data.schema import FRAME_PERIOD as FRAME_PERIOD
 from jaxplan.data.schema import IMAGE_SHAPE as IMAGE_SHAPE
 from jaxplan.data.schema import NO_PATH as NO_PATH
@@ -12,8 +13,10 @@ from jaxplan.data.schema import PATH_POINTS as PATH_POINTS
 from jaxplan.data.schema import TOGGLES as TOGGLES
 from jaxplan.data.schema import DataError as DataError
 from jaxplan.data.schema import Demonstrations as Demonstrations
+from jaxplan.data.schema import PathShard as PathShard
 from jaxplan.data.schema import Shard as Shard
 from jaxplan.data.schema import TimedShard as TimedShard
+from jaxplan.data.schema import as_path_shard as as_path_shard
 from jaxplan.data.schema import as_shard as as_shard
 from jaxplan.data.schema import as_timed_shard as as_timed_shard
 from jaxplan.data.schema import concatenate as concatenate

@@ -91,8 +91,33 @@ class TimedShard(NamedTuple):
     """str [E], why the episode failed; empty = it did not."""
 
 
+class PathShard(NamedTuple):
+    """Paths of the problems of one scene, several ways each.
+
+    N paths, P problems that were posed. What a sampler is told of a problem is kept as it is
+    told (`samplers.scene.condition`), so that training needs no scene.
+    """
+
+    path_q: np.ndarray
+    """f32 [N, 64, d], points uniform in arc length, start to goal [rad or m]."""
+    path_length: np.ndarray
+    """f32 [N], arc length [rad]."""
+    state: np.ndarray
+    """f32 [N, S], start and goal."""
+    things: np.ndarray
+    """f32 [N, n, T], obstacles and objects."""
+    there: np.ndarray
+    """bool [N, n], the others are empty slots."""
+    problem: np.ndarray
+    """i32 [N], the number of the problem that the path solves."""
+    posed: np.ndarray
+    """i32 [P], numbers of all problems."""
+    reason: np.ndarray
+    """str [P], why there is no path; empty = there is one."""
+
+
 Demonstrations = Shard | TimedShard
-KINDS: tuple[type[Any], ...] = (Shard, TimedShard)
+KINDS: tuple[type[Any], ...] = (Shard, TimedShard, PathShard)
 
 _ROWS: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "image": (np.uint8, IMAGE_SHAPE),
@@ -113,44 +138,67 @@ _ROWS: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "episode_seed": (np.int32, ()),
     "episode_success": (np.bool_, ()),
     "episode_failure": (np.str_, ()),
+    "state": (np.float32, ("S",)),
+    "things": (np.float32, ("n", "T")),
+    "there": (np.bool_, ("n",)),
+    "problem": (np.int32, ()),
+    "posed": (np.int32, ()),
+    "reason": (np.str_, ()),
 }
-"""Types and shapes of rows; d joints."""
+"""Types and shapes of rows; a letter stands for one size in a shard, d for the joints."""
 _TABLES = {
     Shard: (Shard._fields[:11], Shard._fields[11:13], Shard._fields[13:]),
     TimedShard: (TimedShard._fields[:8], TimedShard._fields[8:]),
+    PathShard: (PathShard._fields[:6], PathShard._fields[6:]),
 }
 """Columns of one length."""
 
 
 def as_shard(**columns: np.ndarray | list) -> Shard:
     """Casts columns to the schema's types, fills the empty ones' shapes, and checks."""
-    return check_shard(Shard(**_cast(columns, np.shape(columns["path_q"])[-1])))
+    return check_shard(Shard(**_cast(columns, {"d": np.shape(columns["path_q"])[-1]})))
 
 
 def as_timed_shard(joints: int, **columns: np.ndarray | list) -> TimedShard:
     """The same of whole episodes, of an arm with so many joints."""
-    return check_shard(TimedShard(**_cast(columns, joints)))
+    return check_shard(TimedShard(**_cast(columns, {"d": joints})))
+
+
+def as_path_shard(sizes: Mapping[str, int], **columns: np.ndarray | list) -> PathShard:
+    """The same of paths; `sizes` says what d, S, n and T are."""
+    return check_shard(PathShard(**_cast(columns, sizes)))
 
 
 def _cast(
-    columns: Mapping[str, np.ndarray | list], joints: int
+    columns: Mapping[str, np.ndarray | list], sizes: Mapping[str, int]
 ) -> dict[str, np.ndarray]:
-    return {
-        name: np.asarray(column, _ROWS[name][0]).reshape(-1, *_row(name, joints))
-        for name, column in columns.items()
-    }
+    def cast(name: str, column: Any) -> np.ndarray:
+        array = np.asarray(column, _ROWS[name][0])
+        return array.reshape(len(array), *_row(name, sizes))
+
+    return {name: cast(name, column) for name, column in columns.items()}
 
 
-def _row(name: str, joints: int) -> tuple[int, ...]:
+def _row(name: str, sizes: Mapping[str, int]) -> tuple[int, ...]:
     """Shape of a column's row."""
-    return tuple(joints if size == "d" else size for size in _ROWS[name][1])
+    return tuple(sizes.get(size, size) for size in _ROWS[name][1])
+
+
+def _sizes(shard: Any) -> dict[str, int]:
+    """What the letters in the shapes of rows stand for, in a shard of any kind."""
+    found: dict[str, int] = {}
+    for name, column in shard._asdict().items():
+        for size, letter in zip(column.shape[1:], _ROWS[name][1], strict=False):
+            if isinstance(letter, str):
+                found.setdefault(letter, size)
+    return found
 
 
 def check_shard(shard: Any) -> Any:
     """Returns a shard of any kind unchanged, or raises DataError naming the first bad column."""
-    joints = shard.q.shape[-1]
+    sizes = _sizes(shard)
     for name, column in shard._asdict().items():
-        dtype, row = _ROWS[name][0], _row(name, joints)
+        dtype, row = _ROWS[name][0], _row(name, sizes)
         if not np.issubdtype(column.dtype, dtype) or column.shape[1:] != row:
             raise DataError(
                 f"{name} is {column.dtype}{list(column.shape)}, "

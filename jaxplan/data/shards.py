@@ -18,6 +18,7 @@ from jaxplan.data.schema import (
     KINDS,
     DataError,
     Demonstrations,
+    PathShard,
     Shard,
     TimedShard,
     check_shard,
@@ -32,7 +33,7 @@ def shard_path(directory: str | os.PathLike, index: int) -> Path:
     return Path(directory) / f"shard_{index:05d}.npz"
 
 
-def write_shard(path: str | os.PathLike, shard: Demonstrations) -> None:
+def write_shard(path: str | os.PathLike, shard: Demonstrations | PathShard) -> None:
     """Writes a checked shard; the same arrays give the same bytes."""
     write_npz(path, check_shard(shard)._asdict())
 
@@ -73,6 +74,7 @@ def read_demonstrations(directory: str | os.PathLike, kind: type = Shard) -> Any
 _NEEDED = {
     Shard: "frames with subgoals: collect them without --timed",
     TimedShard: "timed demonstrations: collect them with --timed",
+    PathShard: "paths of a scene: record them with `jaxplan record`",
 }
 
 

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from jaxplan.base import Phase, Subgoal
-from jaxplan.data import PATH_POINTS, Shard, as_shard
+from jaxplan.data import PATH_POINTS, Shard, as_shard, resample
 from jaxplan.demonstrations.expert import DemonstrationConfig, ExpertAgent
 from jaxplan.episodes import EpisodeRecord
 from jaxplan.tasks import Tabletop
@@ -59,7 +59,7 @@ class Recorder:
         """The batch's frames in the order of seeds; failed episodes leave only their record."""
         kept = [e for e, record in enumerate(records) if record.success]
         frames = [frame for e in kept for frame in self._frames[e]]
-        paths = [_resample(path) for e in kept for path in self._paths[e]]
+        paths = [resample(path) for e in kept for path in self._paths[e]]
         return as_shard(
             **columns(frames),
             path=np.arange(len(frames)),
@@ -110,11 +110,3 @@ def episode_columns(records: Sequence[EpisodeRecord]) -> dict[str, list]:
         "episode_success": [record.success for record in records],
         "episode_failure": [record.failure or "" for record in records],
     }
-
-
-def _resample(path: np.ndarray) -> tuple[np.ndarray, float]:
-    """`PATH_POINTS` points uniform in arc length, and the length [rad]."""
-    steps = np.linalg.norm(np.diff(path, axis=0), axis=1)
-    arc = np.concatenate([[0.0], np.cumsum(steps)])
-    at = np.linspace(0, arc[-1], PATH_POINTS)
-    return np.stack([np.interp(at, arc, joint) for joint in path.T], 1), float(arc[-1])

@@ -9,10 +9,8 @@ import jax.numpy as jnp
 
 CLIP = 1.02
 """Bound on |x_0|, as a factor of the largest value a segment can take."""
-SPREAD = 0.5
-"""Typical distance of a base from q_curr in a joint [rad]."""
 FARTHEST = 6.0
-"""Bound on the base in x_0, hence 3 rad in a joint."""
+"""Bound on the base in x_0: a joint is that many times its typical distance off at most."""
 
 
 def encode(
@@ -35,14 +33,17 @@ def decode(
     return direction, length
 
 
-def encode_base(base: jax.Array, q: jax.Array) -> jax.Array:
-    """What x_0 has of a base [..., d], beside q_curr [..., d] [rad]; `[..., d]`."""
-    return (base - q) / SPREAD
+def encode_base(base: jax.Array, q: jax.Array, spread: float) -> jax.Array:
+    """What x_0 has of a base [..., d], beside q_curr [..., d] [rad]; `[..., d]`.
+
+    `spread` is the typical distance between them in a joint [rad].
+    """
+    return (base - q) / spread
 
 
-def decode_base(x_0: jax.Array, q: jax.Array) -> jax.Array:
+def decode_base(x_0: jax.Array, q: jax.Array, spread: float) -> jax.Array:
     """The base [..., d] [rad] in x_0 [..., 2 d + 1], beside q_curr [..., d] [rad]."""
-    return q + SPREAD * x_0[..., q.shape[-1] + 1 :]
+    return q + spread * x_0[..., q.shape[-1] + 1 :]
 
 
 def bounds(joints: int, base: bool = False) -> jax.Array:

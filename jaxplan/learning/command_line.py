@@ -15,12 +15,12 @@ class UsageError(ValueError):
     """The command line or the config file is wrong."""
 
 
-def parse(arguments: list[str], kinds: Mapping[str, type]) -> Any:
-    """The config file's settings with the command line's on top.
+def parse(arguments: list[str], kinds: Mapping[str, Any]) -> tuple[str, Any]:
+    """What to train, and the config file's settings with the command line's on top.
 
     Args:
         arguments: `KIND [--config FILE] [--setting VALUE ...]`.
-        kinds: What can be trained, and the class of its settings.
+        kinds: What can be trained, and its settings by default.
 
     Raises:
         UsageError: In one line.
@@ -31,11 +31,12 @@ def parse(arguments: list[str], kinds: Mapping[str, type]) -> Any:
     chosen, rest = first.parse_known_args(arguments)
     if chosen.kind not in kinds:
         raise UsageError(f"train what? {', '.join(kinds)} (got {chosen.kind!r})")
-    default = kinds[chosen.kind]()
+    default = kinds[chosen.kind]
+    settings = type(default)
     if chosen.config is not None:
-        default = _read_config(chosen.config, chosen.kind, kinds[chosen.kind])
+        default = _read_config(chosen.config, chosen.kind, settings)
     config, unknown = tyro.cli(
-        kinds[chosen.kind],
+        settings,
         prog=f"python -m jaxplan.train {chosen.kind} [--config FILE]",
         description="FILE is a Python program, which is run: take only what you trust.",
         default=default,
@@ -49,7 +50,7 @@ def parse(arguments: list[str], kinds: Mapping[str, type]) -> Any:
         near = difflib.get_close_matches(unknown[0].split("=")[0], flags, 1, 0.5)
         hint = f"; did you mean {near[0]}?" if near else "; see --help"
         raise UsageError(f"unknown setting {unknown[0]}{hint}")
-    return config
+    return chosen.kind, config
 
 
 def _read_config(path: str, kind: str, settings: type) -> Any:

@@ -13,7 +13,7 @@ from jaxplan.data import Shard
 from jaxplan.learning.loop import Metrics, TrainConfig
 from jaxplan.learning.segments import PathRows, path_rows, training_segments
 from jaxplan.learning.train_state import Loss, Params
-from jaxplan.networks import Cond, SegmentConfig
+from jaxplan.networks import AnyCond, Cond, SegmentConfig
 from jaxplan.planning.segment import Segment
 from jaxplan.ranges import Count, NotNegative
 
@@ -33,15 +33,19 @@ class SegmentTraining(TrainConfig):
     """Validation draws `val_segments` segments for each of `val_problems` conditions."""
 
 
-Draw = Callable[[Any, dict, Cond, jax.Array, int], Segment]
+Draw = Callable[[Any, dict, AnyCond, jax.Array, int], Segment]
 """`(config, params, cond [P], keys [P], n) -> Segment [P, n]`: a sampler family's."""
 
 
 class Phases(NamedTuple):
-    """A batch of frames as phase starts."""
+    """A batch of starts: frames of an episode, or a scene's problems."""
 
-    cond: Cond
+    cond: AnyCond
     paths: PathRows
+
+
+Gather = Callable[[np.ndarray], Phases]
+"""Rows of a data set to their batch."""
 
 
 def gather(shard: Shard, image: np.ndarray, rows: np.ndarray) -> Phases:
@@ -54,7 +58,7 @@ def gather(shard: Shard, image: np.ndarray, rows: np.ndarray) -> Phases:
 
 def examples(
     config: SegmentTraining, key: jax.Array, batch: Phases
-) -> tuple[Cond, jax.Array]:
+) -> tuple[AnyCond, jax.Array]:
     """Conditions with noise on their targets, and a fresh true x_0 [B, size] for each."""
     key_targets, key_segments = jax.random.split(key)
     network = config.network
@@ -63,16 +67,19 @@ def examples(
     base, segment = training_segments(key_segments, batch.paths, *steps)
     x_0 = diffusion.encode(segment.direction, segment.length, *steps)
     if network.tree_context:
-        parts = x_0, diffusion.encode_base(base, batch.cond.q)
-        x_0 = jnp.concatenate(parts, axis=-1)
+        own = diffusion.encode_base(base, batch.cond.q, network.base_spread)
+        x_0 = jnp.concatenate([x_0, own], axis=-1)
     return cond, x_0
 
 
-def perturb_targets(key: jax.Array, cond: Cond, scale: float) -> Cond:
-    """Noise of `scale` [rad] on q_toggle and q_goal.
+def perturb_targets(key: jax.Array, cond: AnyCond, scale: float) -> AnyCond:
+    """Noise of `scale` [rad] on q_toggle and q_goal, which are a network's in an episode.
 
-    Where they are one point they stay one, as in the last phase before a toggle.
+    Where they are one point they stay one, as in the last phase before a toggle. A scene's
+    problems say exactly where they lead.
     """
+    if not isinstance(cond, Cond):
+        return cond
     key_toggle, key_goal = jax.random.split(key)
     toggle = scale * jax.random.normal(key_toggle, cond.q_toggle.shape)
     goal = scale * jax.random.normal(key_goal, cond.q_goal.shape)
@@ -87,8 +94,7 @@ def validation(
     config: SegmentTraining,
     draw: Draw,
     loss: Loss,
-    shard: Shard,
-    image: np.ndarray,
+    gather: Gather,
     rows: np.ndarray,
 ) -> Callable[[Params], Metrics]:
     """Loss on held-out frames, and how well drawn directions match true ones [deg].
@@ -100,8 +106,8 @@ def validation(
     network, n = config.network, config.val_segments
     key = jax.random.key(20_251_130)
     spread = np.linspace(0, len(rows) - 1, min(len(rows), config.val_problems))
-    batch = gather(shard, image, rows[spread.astype(int)])
-    many = gather(shard, image, rows[:: max(1, len(rows) // 1024)])
+    batch = gather(rows[spread.astype(int)])
+    many = gather(rows[:: max(1, len(rows) // 1024)])
 
     @jax.jit
     def run(params: Params, batch: Phases, many: Phases) -> dict[str, jax.Array]:

@@ -12,7 +12,7 @@ import jax
 import numpy as np
 
 from jaxplan.collision import World
-from jaxplan.motion.sampling import Sampler
+from jaxplan.motion.sampling import Proposals
 from jaxplan.motion.search import Search
 from jaxplan.planning import PlanResult
 
@@ -35,11 +35,11 @@ class BatchSearch:
 
     Args:
         search: Of the scene.
-        sampler: Proposes segments; without it all proposals are uniform.
+        proposals: Learned segments; without them all are uniform.
     """
 
-    def __init__(self, search: Search, sampler: Sampler | None) -> None:
-        self._search, self._sampler = search, sampler
+    def __init__(self, search: Search, proposals: Proposals | None) -> None:
+        self._search, self._proposals = search, proposals
 
     def __call__(self, asked: Batch, time_limit: float = math.inf) -> PlanResult:
         """Answers P problems, in NumPy; what is open after `time_limit` [s] is TIME_OUT."""
@@ -78,7 +78,7 @@ class BatchSearch:
             goal,
             goal,
             keys,
-            self._sampler and self._sampler.between(start, goal, keys),
+            self._proposals and self._proposals(start, goal, keys, world),
             np.arange(size) < count,
             goals[:, 1:],
             time_limit,

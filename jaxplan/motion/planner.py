@@ -46,8 +46,8 @@ class Planner:
         scene: What can touch what.
         config: Settings of the search.
         trajectory: Settings of smoothing and timing.
-        sampler: Proposes segments, a function or trained weights (`samplers.Bank.seeing`);
-            without it all proposals are uniform.
+        sampler: Proposes segments, a function or trained weights (`jaxplan.load_sampler`,
+            `samplers.Bank.seeing`); without it all proposals are uniform.
         velocity: Of each joint at most, or `[d]` [rad/s or m/s].
         acceleration: Of each joint at most, or `[d]` [rad/s^2 or m/s^2].
         q_min: `[d]` lower joint limits; the model's where None. A hinge without limits
@@ -55,7 +55,7 @@ class Planner:
         q_max: `[d]` upper joint limits; the model's where None.
 
     Raises:
-        ValueError: A setting that makes no sense.
+        ValueError: A setting that makes no sense; a sampler of another scene.
     """
 
     def __init__(

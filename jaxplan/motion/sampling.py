@@ -8,8 +8,10 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from jaxplan.collision import World
 from jaxplan.motion.search import jit
 from jaxplan.planning import DrawBank, Segment
+from jaxplan.scene import Scene
 
 SegmentFunction = Callable[[jax.Array, jax.Array, jax.Array, int], Segment]
 """`(key, q_start [d], q_goal [d], count) -> Segment [count]`: tree-extension segments for a
@@ -19,14 +21,24 @@ SIZE = 64
 """Segments that a function is asked for at a time."""
 
 
+Proposals = Callable[[np.ndarray, np.ndarray, jax.Array, World], DrawBank]
+"""`(q_start [P, d], q_goal [P, d], keys [P], world)`: banks of P problems with typed keys; the
+world's leaves have a leading axis P, or none where it is that of all."""
+
+
 @runtime_checkable
 class Sampler(Protocol):
-    """Proposes segments for problems; `samplers.Bank.seeing` gives one of trained weights."""
+    """Proposes segments for problems, from trained weights.
 
-    def between(
-        self, q_start: np.ndarray, q_goal: np.ndarray, keys: jax.Array
-    ) -> DrawBank:
-        """Of problems `[P, d]` [rad] with typed keys `[P]`."""
+    `jaxplan.load_sampler` gives one for a scene, `samplers.Bank.seeing` one that sees a picture.
+    """
+
+    def for_scene(self, scene: Scene) -> Proposals:
+        """Its proposals in a scene.
+
+        Raises:
+            ValueError: It knows nothing of such a scene.
+        """
         ...
 
 
@@ -45,10 +57,13 @@ class FunctionSampler:
         """A copy is without programs."""
         return FunctionSampler, self._made
 
-    def between(
-        self, q_start: np.ndarray, q_goal: np.ndarray, keys: jax.Array
+    def for_scene(self, scene: Scene) -> Proposals:
+        """The same in any scene."""
+        return self._between
+
+    def _between(
+        self, q_start: np.ndarray, q_goal: np.ndarray, keys: jax.Array, world: World
     ) -> DrawBank:
-        """Banks of problems `[P, d]` [rad] with typed keys `[P]`."""
         return lambda number: self._banks(keys, number, q_start, q_goal)
 
     @cached_property

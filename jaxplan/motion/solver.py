@@ -49,7 +49,9 @@ class Solver:
         sampler: Sampler | None,
     ) -> None:
         self._scene, self._config, self._limits = scene, config, limits
-        self._search, self._answers = search, BatchSearch(search, sampler)
+        self._search = search
+        proposals = None if sampler is None else sampler.for_scene(scene)
+        self._answers = BatchSearch(search, proposals)
 
     def __call__(
         self,

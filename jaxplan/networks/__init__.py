@@ -1,5 +1,6 @@
 """The neural networks; the only package that imports Flax."""
 
+from jaxplan.networks.condition import AnyCond as AnyCond
 from jaxplan.networks.condition import Cond as Cond
 from jaxplan.networks.condition import SegmentConfig as SegmentConfig
 from jaxplan.networks.cvae import CvaeConfig as CvaeConfig
@@ -35,5 +36,7 @@ from jaxplan.networks.rows import row_by_row as row_by_row
 from jaxplan.networks.sampler import FewStepConfig as FewStepConfig
 from jaxplan.networks.sampler import SamplerConfig as SamplerConfig
 from jaxplan.networks.sampler import SamplerNetwork as SamplerNetwork
+from jaxplan.networks.surroundings import SceneCond as SceneCond
+from jaxplan.networks.surroundings import SurroundingsConfig as SurroundingsConfig
 from jaxplan.networks.transformer import TransformerConfig as TransformerConfig
 from jaxplan.networks.transformer import TransformerNetwork as TransformerNetwork

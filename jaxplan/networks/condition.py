@@ -1,4 +1,8 @@
-"""The condition network, the same for every learned sampler: what it sees as one vector."""
+"""The condition network, the same for every learned sampler: what it sees as one vector.
+
+It sees a picture and the upper network's targets (`Cond`, the paper's), or in any scene start,
+goal and what stands around (`SceneCond`).
+"""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -8,9 +12,10 @@ import jax
 import jax.numpy as jnp
 
 from jaxplan.networks.joints import normalize
-from jaxplan.networks.mish import mish
+from jaxplan.networks.mlp import mlp
 from jaxplan.networks.resnet import Encoder, EncoderConfig
 from jaxplan.networks.sight import state_vector
+from jaxplan.networks.surroundings import SceneCond, Surroundings, SurroundingsConfig
 from jaxplan.ranges import Checked, Count, NotNegative, Number, Positive
 from jaxplan.robots.panda.limits import Q_MAX, Q_MIN
 
@@ -21,6 +26,9 @@ class SegmentConfig(Checked):
 
     encoder: EncoderConfig | None = EncoderConfig()
     """None: the condition holds the predictor's image features, frozen."""
+    surroundings: SurroundingsConfig | None = None
+    """The condition is a `SceneCond`, and `encoder` and `relative` are nothing to it; None: a
+    `Cond`."""
     cond_features: Count = 256
     relative: bool = False
     """Adds q_toggle - q_curr and q_goal - q_curr [rad] to the condition's input."""
@@ -32,6 +40,8 @@ class SegmentConfig(Checked):
     step_min: Positive = 0.05
     step_max: Positive = 0.2
     """s in [step_min, step_max] [rad]."""
+    base_spread: Positive = 0.5
+    """Typical distance of a segment's base from q_curr in a joint [rad]."""
     q_min: tuple[Number, ...] = Q_MIN
     q_max: tuple[Number, ...] = Q_MAX
 
@@ -57,6 +67,10 @@ class Cond(NamedTuple):
     """[...], 0 open, 1 closed."""
     q_goal: jax.Array
     """[..., d] [rad]."""
+
+
+AnyCond = Cond | SceneCond
+"""What a learned sampler is conditioned on."""
 
 
 class Condition(nn.Module):
@@ -92,6 +106,8 @@ class Condition(nn.Module):
         return self.project(jnp.concatenate(parts, axis=-1))
 
 
-def mlp(hidden: int, outputs: int) -> nn.Sequential:
-    """Two layers with Mish between them; for a module's `setup`."""
-    return nn.Sequential([nn.Dense(hidden), mish, nn.Dense(outputs)])
+def condition_of(config: SegmentConfig) -> nn.Module:
+    """The module that a config's conditions go through; for a module's `setup`."""
+    if config.surroundings is None:
+        return Condition(config)
+    return Surroundings(config.surroundings, config.cond_features)

@@ -6,7 +6,7 @@ import flax.linen as nn
 import jax
 import jax.numpy as jnp
 
-from jaxplan.networks.condition import Cond, Condition, SegmentConfig
+from jaxplan.networks.condition import AnyCond, SegmentConfig, condition_of
 from jaxplan.networks.conditioned_mlp import ConditionedMlp
 from jaxplan.ranges import Count
 
@@ -27,11 +27,11 @@ class CvaeNetwork(nn.Module):
 
     def setup(self) -> None:
         config = self.config
-        self.condition = Condition(config)
+        self.condition = condition_of(config)
         self.recognition = ConditionedMlp(config.hidden, 2 * config.latent, nn.relu)
         self.decoder = ConditionedMlp(config.hidden, config.size, nn.relu)
 
-    def cond(self, cond: Cond) -> jax.Array:
+    def cond(self, cond: AnyCond) -> jax.Array:
         """The vector of a condition, [..., cond_features]."""
         return self.condition(cond)
 
@@ -44,11 +44,11 @@ class CvaeNetwork(nn.Module):
         """x_0 [..., 8] for z [..., latent] and vectors broadcastable to [..., C]."""
         return self.decoder(z, cond)
 
-    def __call__(self, x_0: jax.Array, cond: Cond) -> jax.Array:
+    def __call__(self, x_0: jax.Array, cond: AnyCond) -> jax.Array:
         """Everything once, for initialisation."""
         z, _ = self.recognize(x_0, self.cond(cond))
         return self.draw(z, cond)
 
-    def draw(self, z: jax.Array, cond: Cond) -> jax.Array:
+    def draw(self, z: jax.Array, cond: AnyCond) -> jax.Array:
         """What drawing needs once, for initialisation."""
         return self.generate(z, self.cond(cond))

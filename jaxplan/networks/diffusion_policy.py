@@ -6,8 +6,8 @@ import flax.linen as nn
 import jax
 import jax.numpy as jnp
 
-from jaxplan.networks.condition import mlp
 from jaxplan.networks.mish import mish
+from jaxplan.networks.mlp import mlp
 from jaxplan.networks.policy import PolicyConfig, Window, WindowEncoder
 from jaxplan.networks.sampler import sinusoidal
 from jaxplan.networks.unet1d import ConditionalUnet1D

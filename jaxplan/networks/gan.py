@@ -6,7 +6,7 @@ import flax.linen as nn
 import jax
 import jax.numpy as jnp
 
-from jaxplan.networks.condition import Cond, Condition, SegmentConfig
+from jaxplan.networks.condition import AnyCond, SegmentConfig, condition_of
 from jaxplan.networks.conditioned_mlp import ConditionedMlp
 from jaxplan.ranges import Count
 
@@ -29,7 +29,7 @@ class GanNetwork(nn.Module):
         self.generator = Generator(self.config)
         self.discriminator = Discriminator(self.config)
 
-    def cond(self, cond: Cond) -> jax.Array:
+    def cond(self, cond: AnyCond) -> jax.Array:
         """The generator's vector of a condition, [..., cond_features]."""
         return self.generator.cond(cond)
 
@@ -37,15 +37,15 @@ class GanNetwork(nn.Module):
         """x_0 [..., 8] for z [..., latent] and vectors broadcastable to [..., C]."""
         return self.generator(z, cond)
 
-    def judge(self, x_0: jax.Array, cond: Cond) -> jax.Array:
+    def judge(self, x_0: jax.Array, cond: AnyCond) -> jax.Array:
         """Logit [...] of x_0 [..., 8] being a true segment of the condition."""
         return self.discriminator(x_0, cond)
 
-    def __call__(self, z: jax.Array, cond: Cond) -> jax.Array:
+    def __call__(self, z: jax.Array, cond: AnyCond) -> jax.Array:
         """Everything once, for initialisation."""
         return self.judge(self.draw(z, cond), cond)
 
-    def draw(self, z: jax.Array, cond: Cond) -> jax.Array:
+    def draw(self, z: jax.Array, cond: AnyCond) -> jax.Array:
         """What drawing needs once, for initialisation."""
         return self.generate(z, self.cond(cond))
 
@@ -57,10 +57,10 @@ class Generator(nn.Module):
 
     def setup(self) -> None:
         config = self.config
-        self.condition = Condition(config)
+        self.condition = condition_of(config)
         self.mlp = ConditionedMlp(config.generator, config.size, nn.leaky_relu)
 
-    def cond(self, cond: Cond) -> jax.Array:
+    def cond(self, cond: AnyCond) -> jax.Array:
         return self.condition(cond)
 
     def __call__(self, z: jax.Array, cond: jax.Array) -> jax.Array:
@@ -77,8 +77,8 @@ class Discriminator(nn.Module):
     config: GanConfig
 
     def setup(self) -> None:
-        self.condition = Condition(self.config)
+        self.condition = condition_of(self.config)
         self.mlp = ConditionedMlp(self.config.discriminator, 1, nn.leaky_relu)
 
-    def __call__(self, x_0: jax.Array, cond: Cond) -> jax.Array:
+    def __call__(self, x_0: jax.Array, cond: AnyCond) -> jax.Array:
         return self.mlp(x_0, self.condition(cond))[..., 0]

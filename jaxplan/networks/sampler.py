@@ -11,9 +11,10 @@ import flax.linen as nn
 import jax
 import jax.numpy as jnp
 
-from jaxplan.networks.condition import Cond, Condition, SegmentConfig, mlp
+from jaxplan.networks.condition import AnyCond, SegmentConfig, condition_of
 from jaxplan.networks.film_mlp import FilmMlp
 from jaxplan.networks.mish import mish
+from jaxplan.networks.mlp import mlp
 from jaxplan.networks.unet1d import ConditionalUnet1D
 from jaxplan.ranges import Count, Whole
 
@@ -46,7 +47,7 @@ class SamplerNetwork(nn.Module):
 
     def setup(self) -> None:
         config = self.config
-        self.condition = Condition(config)
+        self.condition = condition_of(config)
         self.step = mlp(4 * config.step_features, config.step_features)
         if config.denoiser == "unet1d":
             if config.size % 2 ** (len(config.hidden) - 1):
@@ -56,7 +57,7 @@ class SamplerNetwork(nn.Module):
             self.denoiser = FilmMlp(config.hidden, config.size)
         self.modulation = nn.Dense(sum(self.denoiser.film_sizes))
 
-    def cond(self, cond: Cond) -> jax.Array:
+    def cond(self, cond: AnyCond) -> jax.Array:
         """The vector of a condition, [..., cond_features]."""
         return self.condition(cond)
 
@@ -76,7 +77,7 @@ class SamplerNetwork(nn.Module):
             return self.denoiser(x_t[..., None], films)[..., 0]
         return self.denoiser(x_t, films)
 
-    def __call__(self, x_t: jax.Array, t: jax.Array, cond: Cond) -> jax.Array:
+    def __call__(self, x_t: jax.Array, t: jax.Array, cond: AnyCond) -> jax.Array:
         """eps for x_t [..., size], t [...] and conditions [...]."""
         return self.denoise(x_t, self.film(self.cond(cond), t))
 

@@ -3,6 +3,7 @@
 from jaxplan.learning.weights import NoWeights as NoWeights
 from jaxplan.learning.weights import Weights as Weights
 from jaxplan.learning.weights import WeightsError as WeightsError
+from jaxplan.pretrained.scene import load_sampler as load_sampler
 from jaxplan.pretrained.store import DIRECTORY as DIRECTORY
 from jaxplan.pretrained.store import UPPER as UPPER
 from jaxplan.pretrained.store import load_pair as load_pair

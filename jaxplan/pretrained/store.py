@@ -70,6 +70,15 @@ def save_weights(
     return path
 
 
+def networks_in(directory: str | os.PathLike) -> list[str]:
+    """Names of the networks whose weights a directory has.
+
+    Raises:
+        WeightsError: It has no manifest, or a damaged one.
+    """
+    return list(_read_manifest(directory))
+
+
 def load_weights(name: str, directory: str | os.PathLike = DIRECTORY) -> Weights:
     """Reads a network's weights, checksum and shapes verified.
 

@@ -10,3 +10,4 @@ from jaxplan.samplers.families import init as init
 from jaxplan.samplers.family import Family as Family
 from jaxplan.samplers.few_step import FewStepTraining as FewStepTraining
 from jaxplan.samplers.gan import GanTraining as GanTraining
+from jaxplan.samplers.scene import SceneSampler as SceneSampler

@@ -8,11 +8,12 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxplan.collision import XLA_OPTIONS
-from jaxplan.learning.weights import Weights
-from jaxplan.networks import Cond, row_by_row
+from jaxplan.collision import XLA_OPTIONS, World
+from jaxplan.learning.weights import Weights, WeightsError
+from jaxplan.networks import AnyCond, Cond, row_by_row
 from jaxplan.planning import DrawBank, Segment
 from jaxplan.samplers.families import draw
+from jaxplan.scene import Scene
 
 SIZE = 32
 """Learned segments drawn at a time for a problem; a search that uses them up gets as many more."""
@@ -52,15 +53,15 @@ class Bank:
         """One problem after the other."""
         return jax.jit(row_by_row(self._drawn), compiler_options=XLA_OPTIONS)
 
-    def _drawn(self, cond: Cond, keys: jax.Array, number: jax.Array) -> Segment:
+    def _drawn(self, cond: AnyCond, keys: jax.Array, number: jax.Array) -> Segment:
         keys = jax.vmap(jax.random.fold_in)(keys, number)
         return draw(self.config, self._made[0].params, cond, keys, self.size)
 
-    def of(self, cond: Cond, keys: jax.Array, alike: bool = False) -> DrawBank:
+    def of(self, cond: AnyCond, keys: jax.Array, alike: bool = False) -> DrawBank:
         """Banks of P problems, with fresh noise for each number.
 
         Args:
-            cond: Conditions, leaves `[P, ...]`.
+            cond: AnyConditions, leaves `[P, ...]`.
             keys: Typed, `[P]`. A problem's segments depend on its own key and condition only.
             alike: To the last bit, whatever P is. On a CPU they always are, which costs a
                 quarter more; elsewhere it is slow where P is large.
@@ -89,7 +90,7 @@ class Bank:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Seeing:
-    """A bank under one observation: a `motion.sampling.Sampler`."""
+    """A bank under one observation: a `motion.sampling.Sampler`, and its own `Proposals`."""
 
     bank: Bank
     image: np.ndarray
@@ -97,8 +98,21 @@ class Seeing:
     gripper_toggle: int
     q_toggle: np.ndarray | None
 
-    def between(
-        self, q_start: np.ndarray, q_goal: np.ndarray, keys: jax.Array
+    def for_scene(self, scene: Scene) -> "Seeing":
+        """The same, if its arm has as many joints.
+
+        Raises:
+            WeightsError: It has not.
+        """
+        joints = len(self.bank.config.q_min)
+        if len(scene.joints) != joints:
+            raise WeightsError(
+                f"the sampler is for {joints} joints, the scene has {len(scene.joints)}"
+            )
+        return self
+
+    def __call__(
+        self, q_start: np.ndarray, q_goal: np.ndarray, keys: jax.Array, world: World
     ) -> DrawBank:
         """Banks of problems `[P, d]` [rad] with typed keys `[P]`."""
         problems = len(q_start)

@@ -8,7 +8,7 @@ import jax.numpy as jnp
 
 from jaxplan.learning.sampler import Phases, SegmentTraining, examples
 from jaxplan.learning.train_state import Params
-from jaxplan.networks import Cond, CvaeConfig, CvaeNetwork
+from jaxplan.networks import AnyCond, CvaeConfig, CvaeNetwork
 from jaxplan.ranges import NotNegative
 from jaxplan.samplers.family import Family
 from jaxplan.samplers.one_pass import one_pass
@@ -25,7 +25,7 @@ class CvaeTraining(SegmentTraining):
     error of a coordinate; Ichter's number."""
 
 
-def fresh(config: CvaeConfig, key: jax.Array, cond: Cond, training: bool) -> Params:
+def fresh(config: CvaeConfig, key: jax.Array, cond: AnyCond, training: bool) -> Params:
     """Fresh weights; for training those of the recognition network too."""
     network = CvaeNetwork(config)
     if training:

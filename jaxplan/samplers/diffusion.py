@@ -10,7 +10,7 @@ import numpy as np
 from jaxplan import diffusion
 from jaxplan.learning.sampler import Phases, SegmentTraining, examples
 from jaxplan.learning.train_state import Params
-from jaxplan.networks import Cond, SamplerConfig, SamplerNetwork
+from jaxplan.networks import AnyCond, SamplerConfig, SamplerNetwork
 from jaxplan.planning.segment import Segment
 from jaxplan.samplers.family import Family
 from jaxplan.samplers.segments import noise, segments
@@ -24,14 +24,16 @@ class SamplerTraining(SegmentTraining):
     network: SamplerConfig = SamplerConfig()
 
 
-def fresh(config: SamplerConfig, key: jax.Array, cond: Cond, training: bool) -> Params:
+def fresh(
+    config: SamplerConfig, key: jax.Array, cond: AnyCond, training: bool
+) -> Params:
     """Fresh weights."""
-    x_0 = jnp.zeros((1, config.size))
-    return SamplerNetwork(config).init(key, x_0, cond.gripper, cond)
+    x_0, t = jnp.zeros((1, config.size)), jnp.zeros(1, jnp.int32)
+    return SamplerNetwork(config).init(key, x_0, t, cond)
 
 
 def draw(
-    config: SamplerConfig, params: dict, cond: Cond, keys: jax.Array, n: int
+    config: SamplerConfig, params: dict, cond: AnyCond, keys: jax.Array, n: int
 ) -> Segment:
     """`n` segments for each of P problems by DDIM; see `samplers.draw`."""
     steps = diffusion.timesteps(config.num_train_timesteps, config.num_inference_steps)
@@ -46,7 +48,7 @@ def draw(
 
 
 def denoiser(
-    config: SamplerConfig, params: dict, cond: Cond, steps: np.ndarray
+    config: SamplerConfig, params: dict, cond: AnyCond, steps: np.ndarray
 ) -> diffusion.Denoise:
     """(x_t [P, n, size], t) -> the network's output, for t among `steps`.
 

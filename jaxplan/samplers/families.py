@@ -6,7 +6,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxplan.learning.train_state import Params
-from jaxplan.networks import Cond, SegmentConfig
+from jaxplan.networks import AnyCond, Cond, SceneCond, SegmentConfig
 from jaxplan.planning.segment import Segment
 from jaxplan.samplers.cvae import CVAE
 from jaxplan.samplers.diffusion import DIFFUSION
@@ -34,7 +34,7 @@ def family_of(config: Any) -> Family:
 def init(
     config: SegmentConfig,
     key: jax.Array,
-    image: tuple[int, ...],
+    image: tuple[int, ...] = (),
     training: bool = True,
 ) -> Params:
     """Fresh weights.
@@ -42,17 +42,26 @@ def init(
     Args:
         config: What network.
         key: Random key.
-        image: Shape of what it gets as an image: (88, 136, 3), or (F,) for features.
+        image: Shape of what it gets as an image: (88, 136, 3), or (F,) for features; nothing
+            to a sampler of a scene.
         training: Also what only training needs.
     """
+    return family_of(config).fresh(config, key, _blank(config, image), training)
+
+
+def _blank(config: SegmentConfig, image: tuple[int, ...]) -> AnyCond:
+    """A condition, for its shapes."""
     joints, mode = jnp.zeros((1, len(config.q_min))), jnp.zeros(1, jnp.int32)
+    if (around := config.surroundings) is not None:
+        things = jnp.zeros((1, min(around.thing, 1), around.thing))
+        state = jnp.zeros((1, around.state))
+        return SceneCond(joints, state, things, jnp.ones(things.shape[:2], bool))
     pixels = jnp.zeros((1, *image), jnp.uint8 if len(image) == 3 else jnp.float32)
-    cond = Cond(pixels, joints, mode, joints, mode, joints)
-    return family_of(config).fresh(config, key, cond, training)
+    return Cond(pixels, joints, mode, joints, mode, joints)
 
 
 def draw(
-    config: SegmentConfig, params: dict, cond: Cond, keys: jax.Array, n: int
+    config: SegmentConfig, params: dict, cond: AnyCond, keys: jax.Array, n: int
 ) -> Segment:
     """`n` segments for each of P problems, in one batch.
 
@@ -61,7 +70,7 @@ def draw(
     Args:
         config: The network that `params` belongs to; its type says which family.
         params: Weights.
-        cond: Conditions with leading axis P.
+        cond: AnyConditions with leading axis P.
         keys: Typed keys [P]. Problem p's segments depend on its own key and condition only.
         n: Segments per problem.
 

@@ -23,7 +23,7 @@ from jaxplan import diffusion
 from jaxplan.learning.sampler import Phases, SegmentTraining, perturb_targets
 from jaxplan.learning.train_state import Params
 from jaxplan.learning.weights import Weights
-from jaxplan.networks import Cond, FewStepConfig, SamplerNetwork
+from jaxplan.networks import AnyCond, FewStepConfig, SamplerNetwork
 from jaxplan.planning.segment import Segment
 from jaxplan.ranges import Whole
 from jaxplan.samplers.diffusion import denoiser, fresh
@@ -44,7 +44,7 @@ class FewStepTraining(SegmentTraining):
 
 
 def draw(
-    config: FewStepConfig, params: dict, cond: Cond, keys: jax.Array, n: int
+    config: FewStepConfig, params: dict, cond: AnyCond, keys: jax.Array, n: int
 ) -> Segment:
     """`n` segments for each of P problems in `num_inference_steps`; see `samplers.draw`."""
     steps = timesteps(config)

@@ -12,7 +12,7 @@ import jax.numpy as jnp
 
 from jaxplan.learning.sampler import Phases, SegmentTraining, examples
 from jaxplan.learning.train_state import Params
-from jaxplan.networks import Cond, GanConfig, GanNetwork
+from jaxplan.networks import AnyCond, GanConfig, GanNetwork
 from jaxplan.ranges import NotNegative
 from jaxplan.samplers.family import Family
 from jaxplan.samplers.one_pass import one_pass
@@ -30,7 +30,7 @@ class GanTraining(SegmentTraining):
     """Standard deviation of the noise on what the discriminator sees."""
 
 
-def fresh(config: GanConfig, key: jax.Array, cond: Cond, training: bool) -> Params:
+def fresh(config: GanConfig, key: jax.Array, cond: AnyCond, training: bool) -> Params:
     """Fresh weights; for training those of the discriminator too."""
     network, z = GanNetwork(config), jnp.zeros((1, config.latent))
     if training:

@@ -5,7 +5,7 @@ from typing import Any
 import jax
 
 from jaxplan.learning.sampler import Draw
-from jaxplan.networks import Cond
+from jaxplan.networks import AnyCond
 from jaxplan.planning.segment import Segment
 from jaxplan.samplers.segments import noise, segments
 
@@ -13,7 +13,9 @@ from jaxplan.samplers.segments import noise, segments
 def one_pass(network: Any) -> Draw:
     """The family's `draw`, with a network that has `cond` and `generate`; z is normal."""
 
-    def draw(config: Any, params: dict, cond: Cond, keys: jax.Array, n: int) -> Segment:
+    def draw(
+        config: Any, params: dict, cond: AnyCond, keys: jax.Array, n: int
+    ) -> Segment:
         """`n` segments for each of P problems; see `samplers.draw`."""
         model = network(config)
         vector = model.apply(params, cond, method="cond")[:, None]

@@ -4,7 +4,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxplan import diffusion
-from jaxplan.networks import Cond, SegmentConfig
+from jaxplan.networks import AnyCond, SegmentConfig
 from jaxplan.planning.segment import Segment
 
 
@@ -14,11 +14,11 @@ def noise(config: SegmentConfig, keys: jax.Array, n: int, size: int) -> jax.Arra
     return config.temperature * normal
 
 
-def segments(config: SegmentConfig, x_0: jax.Array, cond: Cond) -> Segment:
+def segments(config: SegmentConfig, x_0: jax.Array, cond: AnyCond) -> Segment:
     """x_0 [P, n, size] as a Segment."""
     joints, steps = len(config.q_min), (config.step_min, config.step_max)
     direction, length = diffusion.decode(x_0, joints, *steps)
     if not config.tree_context:
         return Segment(direction, length)
     q = jnp.broadcast_to(cond.q[:, None], direction.shape)
-    return Segment(direction, length, diffusion.decode_base(x_0, q))
+    return Segment(direction, length, diffusion.decode_base(x_0, q, config.base_spread))

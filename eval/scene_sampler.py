@@ -1,0 +1,218 @@
+"""A learned sampler of a scene on MotionBenchMaker's problems: with it, and without it.
+
+    python eval/scene_sampler.py --out runs/scene_sampler.json
+
+Every second problem of each set is varied (`parts/variations.py`) and the variations are solved,
+several ways each; samplers learn from these paths. The other problems are then asked of the same
+planner with each sampler and without, in turns. Nothing of them was seen in training. Also
+with obstacles of another problem told to the sampler: what it proposes is then wrong, and
+problems are solved all the same. Recording and training resume where they were stopped.
+"""
+
+import dataclasses
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import jax
+import numpy as np
+from parts.variations import vary
+from peers import slots_for
+from pose_goals import pose_at
+from tqdm import tqdm
+
+from jaxplan import Plan, Planner, PlannerConfig, Scene, cells, make_world, train
+from jaxplan.cells import CellRecorder, Problem, RecordConfig
+from jaxplan.cli import run_script
+from jaxplan.collision import World
+from jaxplan.evaluation.motion_bench import (
+    BenchProblem,
+    data_directory,
+    read_problems,
+    read_robot,
+    robot_mjcf,
+)
+from jaxplan.evaluation.result import write_result
+from jaxplan.motion.sampling import Proposals, Sampler
+from jaxplan.pretrained import load_sampler
+from jaxplan.ranges import Checked, Count
+
+WITHOUT = "none"
+WRONG = "few_step, another problem's obstacles"
+NETWORKS = ("few_step", "sampler", "cvae")
+
+
+@dataclass(frozen=True)
+class Args(Checked):
+    """Records, trains, and asks each problem that was kept aside."""
+
+    out: Path = Path("runs/scene_sampler.json")
+    data: Path = field(default_factory=data_directory)
+    """Directory with the robots' spheres and the problems."""
+    work: Path = Path("runs/scene_sampler")
+    """Directory of recorded paths and weights."""
+    problems: Count = 6000
+    """Variations that are recorded."""
+    steps: Count = 10_000
+    """Of training; half as many for `few_step`."""
+    seeds: Count = 3
+    """Searches of each problem."""
+    record: RecordConfig = RecordConfig()
+    quick: bool = False
+    """64 variations, 50 steps, 2 problems a set."""
+
+
+def main(args: Args) -> None:
+    """Measures, prints a table, writes JSON."""
+    if args.quick:
+        quick = dataclasses.replace(args.record, ways=1, shard_size=32)
+        args = dataclasses.replace(
+            args, problems=64, steps=50, seeds=1, record=quick, work=args.work / "quick"
+        )
+    robot, every = read_robot(args.data), read_problems(args.data)
+    problems = [problem for some in every.values() for problem in some]
+    scene = Scene.from_mjcf(robot_mjcf(robot), slots=slots_for(problems))
+    shown = [p for some in every.values() for p in some[::2]]
+    kept = {
+        name: some[1::2][: 2 if args.quick else None] for name, some in every.items()
+    }
+    learn(args, scene, shown)
+    found = ask(args, scene, kept)
+    rows = {name: summary(found[name]) for name in kept}
+    sides = found[next(iter(kept))]
+    rows["all"] = summary(
+        {side: [plan for name in kept for plan in found[name][side]] for side in sides}
+    )
+    show(rows)
+    write_result(
+        args.out,
+        {
+            "rows": rows,
+            "trained_on": {"problems": len(shown), "variations": args.problems},
+            "settings": dataclasses.asdict(args.record) | {"steps": args.steps},
+            "quick": args.quick,
+        },
+    )
+    print(f"written to {args.out}")
+
+
+def learn(args: Args, scene: Scene, shown: list[BenchProblem]) -> None:
+    """Records variations of `shown` and trains every sampler on them."""
+    planner = Planner(scene, args.record.planner)
+    hands = [pose_at(scene, problem.q_goal) for problem in shown]
+
+    def pose(number: int) -> Problem:
+        row = number % len(shown)
+        return vary(planner, hands[row], shown[row], [args.record.seed, number])
+
+    paths, weights = args.work / "paths", args.work / "weights"
+    recorder = CellRecorder(planner, pose, args.record)
+    cells.record(paths, args.problems, recorder, {"problems": "variations"})
+    common = ["--data", str(paths), "--out", str(weights)]
+    for network in ("sampler", "few_step", "cvae"):
+        steps = args.steps // 2 if network == "few_step" else args.steps
+        more = ["--teacher", str(weights)] if network == "few_step" else []
+        name = f"{args.work.name}_{network}_{steps}"
+        code = train.main(
+            [f"scene_{network}", *common, "--name", name, "--steps", str(steps), *more]
+        )
+        if code:
+            raise RuntimeError(f"scene_{network} was not trained")
+
+
+def ask(
+    args: Args, scene: Scene, kept: Mapping[str, list[BenchProblem]]
+) -> dict[str, dict[str, list[Plan]]]:
+    """Each problem of each planner, which take turns."""
+    samplers: dict[str, Sampler | None] = {WITHOUT: None}
+    samplers |= {n: load_sampler(args.work / "weights", n) for n in NETWORKS}
+    other = [make_world(scene, obstacles=some[0].obstacles) for some in kept.values()]
+    samplers[WRONG] = Mistaken(load_sampler(args.work / "weights", "few_step"), other)
+    config = PlannerConfig()
+    sides = {name: Planner(scene, config, sampler=s) for name, s in samplers.items()}
+    found: dict[str, dict[str, list[Plan]]] = {}
+    for name, problems in kept.items():
+        worlds = [make_world(scene, obstacles=p.obstacles) for p in problems]
+        found[name] = {side: [] for side in sides}
+        for planner in sides.values():  # compiles
+            planner.plan(problems[0].q_start, problems[0].q_goal, 0, worlds[0])
+        asked = [
+            (row, seed) for seed in range(args.seeds) for row in range(len(problems))
+        ]
+        for row, seed in tqdm(asked, desc=name, unit="problem"):
+            for side, planner in sides.items():
+                q = problems[row].q_start, problems[row].q_goal
+                began = time.perf_counter()
+                plan = planner.plan(*q, seed, worlds[row])
+                seconds = time.perf_counter() - began
+                found[name][side].append(dataclasses.replace(plan, time=seconds))
+    refuse_untrue(sides[WITHOUT], found)
+    return found
+
+
+def refuse_untrue(
+    planner: Planner, found: Mapping[str, Mapping[str, list[Plan]]]
+) -> None:
+    """Every path is C MuJoCo's too."""
+    for name, sides in found.items():
+        for side, plans in sides.items():
+            for plan in plans:
+                if plan.solved and not planner.certify(plan).valid:
+                    raise RuntimeError(f"{name}, {side}: a path that C MuJoCo refuses")
+
+
+class Mistaken:
+    """A sampler that is told of obstacles which are not there."""
+
+    def __init__(self, sampler: Sampler, worlds: list[World]) -> None:
+        self._sampler, self._worlds = sampler, worlds
+
+    def for_scene(self, scene: Scene) -> Proposals:
+        """Proposals for the next of its worlds in turn."""
+        proposals, turn = self._sampler.for_scene(scene), iter(range(10**9))
+
+        def wrong(q_start: Any, q_goal: Any, keys: jax.Array, world: World) -> Any:
+            told = self._worlds[next(turn) % len(self._worlds)]
+            same = np.array_equal(told.slot_pose, world.slot_pose)
+            return proposals(q_start, q_goal, keys, self._worlds[0] if same else told)
+
+        return wrong
+
+
+def summary(found: Mapping[str, list[Plan]]) -> dict[str, dict[str, float]]:
+    """Figures of each side; ratios of means, and of times, to the planner without."""
+    rows = {}
+    for side, plans in found.items():
+        seconds = np.array([plan.time for plan in plans])
+        rows[side] = {
+            "solved": sum(plan.solved for plan in plans),
+            "of": len(plans),
+            "expansions": float(np.mean([plan.expansions for plan in plans])),
+            "expansions_median": float(np.median([plan.expansions for plan in plans])),
+            "checks": float(np.mean([plan.checks for plan in plans])),
+            "length": float(np.median([plan.length for plan in plans])),
+            "ms": 1e3 * float(np.median(seconds)),
+            "ms_p95": 1e3 * float(np.quantile(seconds, 0.95)),
+        }
+    for side, row in rows.items():
+        for name in ("expansions", "checks", "ms", "ms_p95"):
+            rows[side][f"{name}_ratio"] = row[name] / rows[WITHOUT][name]
+    return rows
+
+
+def show(rows: Mapping[str, Mapping[str, Mapping[str, float]]]) -> None:
+    """The table."""
+    for name, sides in rows.items():
+        for side, row in sides.items():
+            print(
+                f"{name:16s} {side:40s} {row['solved']:.0f} of {row['of']:.0f}, expansions "
+                f"{row['expansions']:7.1f} ({row['expansions_ratio']:.2f}), checks "
+                f"{row['checks']:7.0f} ({row['checks_ratio']:.2f}), {row['ms']:6.2f} ms "
+                f"({row['ms_ratio']:.2f}), p95 {row['ms_p95']:6.1f} ms ({row['ms_p95_ratio']:.2f})"
+            )
+
+
+if __name__ == "__main__":
+    run_script(main, Args)
