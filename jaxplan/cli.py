@@ -89,8 +89,10 @@ class RecordCommand:
     """Paths of each problem."""
     seed: int = 0
     """Of problems and searches."""
-    expansions: int = 2000
-    """Of each search, all of which are used: the more, the shorter the paths."""
+    method: str = "rrt_connect"
+    """Of the searches; `ao_rrt_connect` uses all of --expansions to find ever shorter paths."""
+    expansions: int = 50_000
+    """Of each search at most."""
     margin: float = 0.0
     """Clearance of the paths [m]."""
     joints: str | None = None
@@ -213,7 +215,10 @@ def _record(command: RecordCommand) -> int:
         check("count", command.count, Count)
     usual = RecordConfig()
     planner = dataclasses.replace(
-        usual.planner, max_expansions=command.expansions, margin=command.margin
+        usual.planner,
+        method=command.method,
+        max_expansions=command.expansions,
+        margin=command.margin,
     )
     config = RecordConfig(command.ways, command.seed, usual.shard_size, planner)
     names = "problems", "count", "out", "joints", "hand"

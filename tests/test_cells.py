@@ -51,7 +51,7 @@ SLOTS = {"box": 1, "sphere": 1}
 QUICK = RecordConfig(
     ways=2,
     shard_size=4,
-    planner=PlannerConfig(method="ao_rrt_connect", max_expansions=200),
+    planner=PlannerConfig(max_expansions=2000),
 )
 
 

@@ -42,7 +42,7 @@ def refused(capsys):
 
 def test_an_unknown_command_gets_a_suggestion(refused):
     assert "did you mean solve?" in refused("slove", "--seed", 0)
-    assert "there is: plan, check, solve" in refused("xyz")
+    assert "there is: plan, check, record, solve" in refused("xyz")
 
 
 @pytest.mark.parametrize("seed", [-1, 2**31])

@@ -21,9 +21,6 @@ from jaxplan.ranges import Checked, Count, Whole
 from jaxplan.samplers.scene import ENCODING, conditions_in
 from jaxplan.scene.identity import identity
 
-WAYS_PLANNER = PlannerConfig(method="ao_rrt_connect", max_expansions=2000)
-"""Finds a way, and shortens it as long as its budget lasts; another seed, another way."""
-
 
 @dataclass(frozen=True)
 class RecordConfig(Checked):
@@ -34,7 +31,8 @@ class RecordConfig(Checked):
     seed: Whole = 0
     shard_size: Count = 64
     """Problems a shard."""
-    planner: PlannerConfig = WAYS_PLANNER
+    planner: PlannerConfig = PlannerConfig()
+    """With `ao_rrt_connect` a search goes on to the end of its budget, for ever shorter paths."""
 
 
 def record(
@@ -95,6 +93,7 @@ class CellRecorder:
             [int(seed) for seed in (first + of * ways + way) % 2**32],
             [problem.world for problem in posed],
         )
+        plans = self._planner.shorten(plans)
         solved = [row for row, plan in enumerate(plans) if plan.solved]
         paths = [resample(plans[row].path) for row in solved]
         ends = [plans[row].path[[0, -1]] for row in solved]

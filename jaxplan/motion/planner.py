@@ -24,10 +24,11 @@ from jaxplan.config import PlannerConfig, TrajectoryConfig
 from jaxplan.ik import Limits, Pose, inverse_kinematics
 from jaxplan.motion import checks
 from jaxplan.motion.batch import keys_of
-from jaxplan.motion.blocks import in_blocks
+from jaxplan.motion.clearances import clearances
 from jaxplan.motion.plan import Plan, Timed
 from jaxplan.motion.sampling import SIZE, FunctionSampler, Sampler, SegmentFunction
 from jaxplan.motion.search import Search
+from jaxplan.motion.shortening import shortened
 from jaxplan.motion.solver import Goal, Solver
 from jaxplan.planning.settings import check_settings
 from jaxplan.process import refuse_fork
@@ -190,6 +191,20 @@ class Planner:
             self.scene, world, pose, self.limits, reference, seed, count, free
         ).q
 
+    def shorten(self, plans: Sequence[Plan]) -> list[Plan]:
+        """Replaces stretches of paths by straight lines that are free, as `time` does.
+
+        Where joints come round, a path may end full turns from its goal. Plans that are not
+        solved stay as they are.
+
+        Raises:
+            ValueError: What is no plan.
+        """
+        refuse_fork()
+        for plan in plans:
+            check("plans", plan, Plan)
+        return shortened(plans, self._search, self._trajectory, self.circular)
+
     def time(self, plan: Plan, speed: float = 1.0) -> Timed:
         """Shortens, smooths and times a path (section 4.3), and checks all of it again.
 
@@ -264,18 +279,8 @@ class Planner:
         """
         refuse_fork()
         q = checks.rows(qs, None, self._d, "qs")
-        empty = self.empty_world
-        world = empty if world is None else world
-        batch = checks.batch_of(world, empty, q.shape[:-1])
-        world = checks.world_of(world, empty, batch)
-        q = np.broadcast_to(q, (*batch, self._d)).reshape(-1, self._d)
-        if world.passive.ndim == empty.passive.ndim:  # one for all
-            found = in_blocks(partial(self._search.clearance, world), q)
-        else:
-            leaves = zip(world, empty, strict=True)
-            each = World(*(leaf.reshape(len(q), *own.shape) for leaf, own in leaves))
-            found = in_blocks(self._search.clearance, each, q)
-        return found.reshape(batch)
+        given = self.empty_world if world is None else world
+        return clearances(self._search, given, self.empty_world, q)
 
     def _solve(
         self,

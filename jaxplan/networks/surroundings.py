@@ -25,8 +25,8 @@ class SurroundingsConfig(Checked):
     """Numbers of a state; 0: as many as the scene of the data has."""
     thing: Whole = 0
     """Numbers of a thing; likewise, and 0 where nothing can be around."""
-    hidden: Count = 256
-    features: Count = 256
+    hidden: Count = 128
+    features: Count = 128
     """Of all things together."""
 
 
