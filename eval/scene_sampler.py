@@ -1,20 +1,24 @@
-"""A learned sampler of a scene on MotionBenchMaker's problems: with it, and without it.
+"""A learned sampler of a scene: the same planner with it, and without it.
 
     python eval/scene_sampler.py --out runs/scene_sampler.json
+    python eval/scene_sampler.py --cell docs/arm.xml --description docs/cell.json
 
-Every second problem of each set is varied (`parts/variations.py`) and the variations are solved,
-several ways each; samplers learn from these paths. The other problems are then asked of the same
-planner with each sampler and without, in turns. Nothing of them was seen in training. Also
-with obstacles of another problem told to the sampler: what it proposes is then wrong, and
+By default on MotionBenchMaker's problems. Every second problem of each set is varied
+(`parts/variations.py`) and the variations are solved, several ways each; samplers learn from
+these paths. The other problems are then asked of the planner with each sampler and without, in
+turns. With `--cell`, problems are drawn from a description, and others of it are asked.
+
+Also with obstacles of another problem told to the sampler: what it proposes is then wrong, and
 problems are solved all the same. Recording and training resume where they were stopped.
 """
 
 import dataclasses
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import jax
 import numpy as np
@@ -23,7 +27,7 @@ from peers import slots_for
 from pose_goals import pose_at
 from tqdm import tqdm
 
-from jaxplan import Plan, Planner, PlannerConfig, Scene, cells, make_world, train
+from jaxplan import Plan, Planner, Scene, cells, make_world, train
 from jaxplan.cells import CellRecorder, Problem, RecordConfig
 from jaxplan.cli import run_script
 from jaxplan.collision import World
@@ -49,19 +53,34 @@ class Args(Checked):
     """Records, trains, and asks each problem that was kept aside."""
 
     out: Path = Path("runs/scene_sampler.json")
+    cell: Path | None = None
+    """An MJCF; None: the Panda among MotionBenchMaker's problems."""
+    description: Path | None = None
+    """Of the cell's problems, see `jaxplan.cells.description`."""
     data: Path = field(default_factory=data_directory)
-    """Directory with the robots' spheres and the problems."""
+    """Directory with the robots' spheres and MotionBenchMaker's problems."""
     work: Path = Path("runs/scene_sampler")
     """Directory of recorded paths and weights."""
-    problems: Count = 6000
-    """Variations that are recorded."""
-    steps: Count = 10_000
+    problems: Count = 3072
+    """That are recorded."""
+    steps: Count = 5000
     """Of training; half as many for `few_step`."""
     seeds: Count = 3
     """Searches of each problem."""
     record: RecordConfig = RecordConfig()
     quick: bool = False
-    """64 variations, 50 steps, 2 problems a set."""
+    """64 recorded problems, 50 steps, 2 problems a set."""
+
+
+class Ground(NamedTuple):
+    """Where a sampler is tried."""
+
+    scene: Scene
+    recorded: Callable[[Planner], Callable[[int], Problem]]
+    """Problems by number that it learns from."""
+    kept: Callable[[Planner], dict[str, list[Problem]]]
+    """Problems that it is asked, set by set."""
+    facts: dict[str, Any]
 
 
 def main(args: Args) -> None:
@@ -71,45 +90,78 @@ def main(args: Args) -> None:
         args = dataclasses.replace(
             args, problems=64, steps=50, seeds=1, record=quick, work=args.work / "quick"
         )
-    robot, every = read_robot(args.data), read_problems(args.data)
-    problems = [problem for some in every.values() for problem in some]
-    scene = Scene.from_mjcf(robot_mjcf(robot), slots=slots_for(problems))
-    shown = [p for some in every.values() for p in some[::2]]
-    kept = {
-        name: some[1::2][: 2 if args.quick else None] for name, some in every.items()
+    ground = motion_bench(args) if args.cell is None else cell(args)
+    learn(args, ground)
+    found = ask(args, ground)
+    rows = {name: summary(sides) for name, sides in found.items()}
+    every = {
+        side: [p for sides in found.values() for p in sides[side]]
+        for side in (WITHOUT, *NETWORKS, WRONG)
     }
-    learn(args, scene, shown)
-    found = ask(args, scene, kept)
-    rows = {name: summary(found[name]) for name in kept}
-    sides = found[next(iter(kept))]
-    rows["all"] = summary(
-        {side: [plan for name in kept for plan in found[name][side]] for side in sides}
-    )
+    rows["all"] = summary(every)
     show(rows)
+    settings = dataclasses.asdict(args.record) | {
+        name: getattr(args, name) for name in ("problems", "steps", "seeds")
+    }
     write_result(
         args.out,
-        {
-            "rows": rows,
-            "trained_on": {"problems": len(shown), "variations": args.problems},
-            "settings": dataclasses.asdict(args.record) | {"steps": args.steps},
-            "quick": args.quick,
-        },
+        {"rows": rows, **ground.facts, "settings": settings, "quick": args.quick},
     )
     print(f"written to {args.out}")
 
 
-def learn(args: Args, scene: Scene, shown: list[BenchProblem]) -> None:
-    """Records variations of `shown` and trains every sampler on them."""
-    planner = Planner(scene, args.record.planner)
-    hands = [pose_at(scene, problem.q_goal) for problem in shown]
+def motion_bench(args: Args) -> Ground:
+    """The Panda's sets: every second problem is varied, the others are kept."""
+    robot, every = read_robot(args.data), read_problems(args.data)
+    problems = [problem for some in every.values() for problem in some]
+    scene = Scene.from_mjcf(robot_mjcf(robot), slots=slots_for(problems))
+    shown = [problem for some in every.values() for problem in some[::2]]
 
-    def pose(number: int) -> Problem:
-        row = number % len(shown)
-        return vary(planner, hands[row], shown[row], [args.record.seed, number])
+    def recorded(planner: Planner) -> Callable[[int], Problem]:
+        hands = [pose_at(scene, problem.q_goal) for problem in shown]
 
+        def pose(number: int) -> Problem:
+            row = number % len(shown)
+            return vary(planner, hands[row], shown[row], [args.record.seed, number])
+
+        return pose
+
+    def kept(planner: Planner) -> dict[str, list[Problem]]:
+        def problem(p: BenchProblem) -> Problem:
+            return Problem(
+                p.q_start, p.q_goal, make_world(scene, obstacles=p.obstacles)
+            )
+
+        most = 2 if args.quick else None
+        return {
+            name: [*map(problem, some[1::2][:most])] for name, some in every.items()
+        }
+
+    return Ground(scene, recorded, kept, {"varied": len(shown)})
+
+
+def cell(args: Args) -> Ground:
+    """A cell of one's own, as it is described."""
+    given = {} if args.description is None else cells.read_json(args.description)
+    scene = Scene.from_mjcf(str(args.cell), slots=cells.slots_needed(given))
+    seed, count = args.record.seed, 2 if args.quick else 100
+
+    def recorded(planner: Planner) -> Callable[[int], Problem]:
+        return partial(cells.Cell(planner, given).draw, seed)
+
+    def kept(planner: Planner) -> dict[str, list[Problem]]:
+        draw = cells.Cell(planner, given).draw
+        return {"cell": [draw(seed + 1, number) for number in range(count)]}
+
+    return Ground(scene, recorded, kept, {"description": given})
+
+
+def learn(args: Args, ground: Ground) -> None:
+    """Records problems and trains every sampler on their paths."""
+    planner = Planner(ground.scene, args.record.planner)
     paths, weights = args.work / "paths", args.work / "weights"
-    recorder = CellRecorder(planner, pose, args.record)
-    cells.record(paths, args.problems, recorder, {"problems": "variations"})
+    recorder = CellRecorder(planner, ground.recorded(planner), args.record)
+    cells.record(paths, args.problems, recorder, ground.facts)
     common = ["--data", str(paths), "--out", str(weights)]
     for network in ("sampler", "few_step", "cvae"):
         steps = args.steps // 2 if network == "few_step" else args.steps
@@ -122,30 +174,25 @@ def learn(args: Args, scene: Scene, shown: list[BenchProblem]) -> None:
             raise RuntimeError(f"scene_{network} was not trained")
 
 
-def ask(
-    args: Args, scene: Scene, kept: Mapping[str, list[BenchProblem]]
-) -> dict[str, dict[str, list[Plan]]]:
+def ask(args: Args, ground: Ground) -> dict[str, dict[str, list[Plan]]]:
     """Each problem of each planner, which take turns."""
     samplers: dict[str, Sampler | None] = {WITHOUT: None}
     samplers |= {n: load_sampler(args.work / "weights", n) for n in NETWORKS}
-    other = [make_world(scene, obstacles=some[0].obstacles) for some in kept.values()]
-    samplers[WRONG] = Mistaken(load_sampler(args.work / "weights", "few_step"), other)
-    config = PlannerConfig()
-    sides = {name: Planner(scene, config, sampler=s) for name, s in samplers.items()}
+    kept = ground.kept(Planner(ground.scene))
+    others = [some[row].world for some in kept.values() for row in (0, 1)]
+    samplers[WRONG] = Mistaken(load_sampler(args.work / "weights", "few_step"), others)
+    sides = {name: Planner(ground.scene, sampler=s) for name, s in samplers.items()}
     found: dict[str, dict[str, list[Plan]]] = {}
+    for planner in sides.values():  # compiles
+        first = next(iter(kept.values()))[0]
+        planner.plan(first.q_start, first.goal, 0, first.world)
     for name, problems in kept.items():
-        worlds = [make_world(scene, obstacles=p.obstacles) for p in problems]
         found[name] = {side: [] for side in sides}
-        for planner in sides.values():  # compiles
-            planner.plan(problems[0].q_start, problems[0].q_goal, 0, worlds[0])
-        asked = [
-            (row, seed) for seed in range(args.seeds) for row in range(len(problems))
-        ]
-        for row, seed in tqdm(asked, desc=name, unit="problem"):
+        asked = [(problem, seed) for seed in range(args.seeds) for problem in problems]
+        for problem, seed in tqdm(asked, desc=name, unit="problem"):
             for side, planner in sides.items():
-                q = problems[row].q_start, problems[row].q_goal
                 began = time.perf_counter()
-                plan = planner.plan(*q, seed, worlds[row])
+                plan = planner.plan(problem.q_start, problem.goal, seed, problem.world)
                 seconds = time.perf_counter() - began
                 found[name][side].append(dataclasses.replace(plan, time=seconds))
     refuse_untrue(sides[WITHOUT], found)
