@@ -36,13 +36,12 @@ class Bank:
         if unknown := sorted(set(changes) - known):
             kind = type(weights.config).__name__
             raise ValueError(f"{unknown[0]} {changes[unknown[0]]}: {kind} has none")
-        self._made = weights, size, changes
+        self.weights, self._changes = weights, changes
         self.config, self.size = dataclasses.replace(weights.config, **changes), size
 
     def __reduce__(self) -> tuple[Any, ...]:
         """A copy is without its program."""
-        weights, size, changes = self._made
-        return partial(Bank, **changes), (weights, size)
+        return partial(Bank, **self._changes), (self.weights, self.size)
 
     @cached_property
     def _draw(self) -> Any:
@@ -55,7 +54,7 @@ class Bank:
 
     def _drawn(self, cond: AnyCond, keys: jax.Array, number: jax.Array) -> Segment:
         keys = jax.vmap(jax.random.fold_in)(keys, number)
-        return draw(self.config, self._made[0].params, cond, keys, self.size)
+        return draw(self.config, self.weights.params, cond, keys, self.size)
 
     def of(self, cond: AnyCond, keys: jax.Array, alike: bool = False) -> DrawBank:
         """Banks of P problems, with fresh noise for each number.

@@ -70,12 +70,12 @@ def film_motion(
         places = [pose(row).geom_xpos[moving].copy() for row in qpos]
         low = np.min([place - reach for place in places], (0, 1))
         high = np.max([place + reach for place in places], (0, 1))
-        view = _fitting_view(low, high, model.vis.global_.fovy)
+        view = fitting_view(low, high, model.vis.global_.fovy)
     camera = Camera(model, HEIGHT, WIDTH, groups)
     write_video(path, (camera.render(pose(row), view) for row in qpos), fps)
 
 
-def _fitting_view(low: np.ndarray, high: np.ndarray, fovy: float) -> mujoco.MjvCamera:
+def fitting_view(low: np.ndarray, high: np.ndarray, fovy: float) -> mujoco.MjvCamera:
     """A view of the box from `low [3]` to `high [3]` [m], `fovy` high [deg]."""
     view = mujoco.MjvCamera()
     view.lookat[:] = (low + high) / 2

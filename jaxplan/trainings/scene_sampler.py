@@ -30,13 +30,13 @@ SEGMENT: dict[str, Any] = {
 DENOISER: dict[str, Any] = {"denoiser": "film_mlp", "hidden": (256, 256, 256)}
 COMMON: dict[str, Any] = {
     "data": ("data/cell",),
-    "steps": 10_000,
+    "steps": 5000,
     "batch_size": 512,
     "log_every": 100,
 }
 TUNED: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
     "sampler": (DENOISER, {}),
-    "few_step": (DENOISER, {"steps": 5000, "batch_size": 128}),
+    "few_step": (DENOISER, {"steps": 2500, "batch_size": 128}),
     "cvae": ({"latent": 8}, {"kl_weight": 0.01}),
     "gan": (
         {"generator": (256, 256, 256), "discriminator": (256, 256)},
