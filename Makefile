@@ -6,7 +6,7 @@ BIN := .venv/bin
 # Compiled XLA programs are kept between runs of this checkout.
 export JAX_COMPILATION_CACHE_DIR := $(CURDIR)/.cache/jax
 
-.PHONY: demo test docs format clean
+.PHONY: demo test test-long docs format clean
 
 demo: .venv/installed
 	$(BIN)/jaxplan solve --seed 100000 --out runs/demo
@@ -16,6 +16,10 @@ test: .venv/installed
 	$(BIN)/ruff format --check .
 	$(BIN)/pyright --pythonpath $(BIN)/python
 	$(BIN)/pytest -n auto --dist loadfile
+
+# What `make test` leaves out because each takes long.
+test-long: .venv/installed
+	$(BIN)/pytest -n auto --dist loadfile -m "long and not slow and not gpu"
 
 docs: .venv/installed
 	$(BIN)/pip install --quiet --disable-pip-version-check -e '.[docs]' -c constraints.txt

@@ -96,7 +96,7 @@ def proposed(
     draw = sampler.for_scene(scene)(start, goal, keys, problem.world)
     found, number = [], 0
     while sum(map(len, found)) < count:
-        found.append(np.asarray(draw(np.array([number])).end[0]))
+        found.append(np.asarray(draw(jnp.array([number])).end[0]))
         number += 1
     low, high = np.asarray(scene.q_min), np.asarray(scene.q_max)
     return np.concatenate(found)[:count].clip(low, high)

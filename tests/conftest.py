@@ -14,6 +14,18 @@ os.environ.setdefault("XLA_FLAGS", "--xla_backend_optimization_level=1")
 import jax
 import pytest
 from hypothesis import settings
+from jaxtyping import install_import_hook
+
+# Shapes in annotations are checked, in tests alone. Not of what is traced through a registered
+# dataclass (Scene): JAX rebuilds such records of other things than arrays.
+SHAPED = [
+    "jaxplan.diffusion",
+    "jaxplan.learning.losses",
+    "jaxplan.learning.segments",
+    "jaxplan.planning.space",
+    "jaxplan.samplers.families",
+]
+install_import_hook(SHAPED, "beartype.beartype")
 
 # Compilation makes first examples slow, and the same examples every time make a failure
 # belong to the change that caused it.

@@ -275,6 +275,22 @@ def test_a_timed_motion_keeps_limits_and_ends_at_rest(planner, answers, scene, s
         assert max(used, push) > 0.98
 
 
+def test_shortened_paths_are_no_longer_and_as_free(planner, answers):
+    unsolved = planner.plan(LEFT, INTO_POST)
+    found = planner.shorten([*answers, unsolved])
+    assert found[-1] is unsolved
+    for before, after in zip(answers, found, strict=False):
+        np.testing.assert_array_equal(after.path[[0, -1]], before.path[[0, -1]])
+        assert after.length <= before.length + 1e-5
+        assert planner.certify(after).valid
+    assert sum(x.length for x in found[:-1]) < 0.95 * sum(x.length for x in answers)
+    (alone,) = planner.shorten(answers[3:4])
+    np.testing.assert_array_equal(alone.path, found[3].path)
+    assert planner.shorten([]) == []
+    with pytest.raises(ValueError, match="plans"):
+        planner.shorten(["no plan"])
+
+
 def test_a_sampler_of_ones_own_guides_the_search(scene):
     asked = []
 
@@ -294,6 +310,28 @@ def test_a_sampler_of_ones_own_guides_the_search(scene):
     assert planner.certify(answers[0]).valid
     assert asked
     assert asked[0][:2] == ((4,), (4,))
+
+
+@pytest.mark.parametrize("method", ["rrt", "rrt_connect", "ao_rrt_connect"])
+@pytest.mark.parametrize("beyond", ["end", "base"])
+def test_a_sampler_cannot_lead_out_of_the_limits(scene, method, beyond):
+    """Its segments end, or begin, beyond them; trees take one or the other for where to go."""
+
+    def out(key, q_start, q_goal, count):
+        base = 3.5 * jax.random.normal(key, (count, 4))
+        way = jax.random.normal(jax.random.fold_in(key, 1), (count, 4))
+        segment = Segment(way, jnp.full(count, 0.7), base)
+        return segment if beyond == "end" else segment.reversed()
+
+    config = PlannerConfig(method=method, max_expansions=1500, p_uniform=0.1)
+    planner = Planner(scene, config, sampler=out)
+    starts, goals = np.stack([LEFT] * 8), np.stack([RIGHT] * 8)
+    plans = planner.plan_batch(starts, goals)
+    for plan in plans:  # unsolved ones end at the node nearest to the goal
+        assert (plan.path >= planner.q_min).all()
+        assert (plan.path <= planner.q_max).all()
+        assert planner.certify(plan).valid
+    assert sum(plan.solved for plan in plans) > 4
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf, 0.0, 1e30])

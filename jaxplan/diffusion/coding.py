@@ -4,8 +4,8 @@ Raw, s would have a standard deviation of 0.04 beside 0.38 of the coordinates of
 come out with the wrong spread.
 """
 
-import jax
 import jax.numpy as jnp
+from jaxtyping import Array, Float
 
 CLIP = 1.02
 """Bound on |x_0|, as a factor of the largest value a segment can take."""
@@ -14,18 +14,21 @@ FARTHEST = 6.0
 
 
 def encode(
-    direction: jax.Array, length: jax.Array, step_min: float, step_max: float
-) -> jax.Array:
-    """x_0 = [u sqrt(d); s mapped to [-1, 1]], `[..., d]` and `[...]` to `[..., d + 1]`."""
+    direction: Float[Array, "*B d"],
+    length: Float[Array, "*B"],
+    step_min: float,
+    step_max: float,
+) -> Float[Array, "*B d+1"]:
+    """x_0 = [u sqrt(d); s mapped to [-1, 1]]."""
     centre, half = 0.5 * (step_min + step_max), 0.5 * (step_max - step_min)
     scaled = direction * jnp.sqrt(direction.shape[-1])
     return jnp.concatenate([scaled, ((length - centre) / half)[..., None]], axis=-1)
 
 
 def decode(
-    x_0: jax.Array, joints: int, step_min: float, step_max: float
-) -> tuple[jax.Array, jax.Array]:
-    """Unit direction [..., joints] and length [...] in [step_min, step_max] [rad]."""
+    x_0: Float[Array, "*B size"], joints: int, step_min: float, step_max: float
+) -> tuple[Float[Array, "*B {joints}"], Float[Array, "*B"]]:
+    """Unit direction, and length in [step_min, step_max] [rad]."""
     centre, half = 0.5 * (step_min + step_max), 0.5 * (step_max - step_min)
     u, s = x_0[..., :joints], x_0[..., joints]
     direction = u / jnp.maximum(jnp.linalg.norm(u, axis=-1, keepdims=True), 1e-6)
@@ -33,20 +36,24 @@ def decode(
     return direction, length
 
 
-def encode_base(base: jax.Array, q: jax.Array, spread: float) -> jax.Array:
-    """What x_0 has of a base [..., d], beside q_curr [..., d] [rad]; `[..., d]`.
+def encode_base(
+    base: Float[Array, "*B d"], q: Float[Array, "*B d"], spread: float
+) -> Float[Array, "*B d"]:
+    """What x_0 has of a base, beside q_curr [rad].
 
     `spread` is the typical distance between them in a joint [rad].
     """
     return (base - q) / spread
 
 
-def decode_base(x_0: jax.Array, q: jax.Array, spread: float) -> jax.Array:
-    """The base [..., d] [rad] in x_0 [..., 2 d + 1], beside q_curr [..., d] [rad]."""
+def decode_base(
+    x_0: Float[Array, "*B size"], q: Float[Array, "*B d"], spread: float
+) -> Float[Array, "*B d"]:
+    """The base [rad] in x_0, beside q_curr [rad]."""
     return q + spread * x_0[..., q.shape[-1] + 1 :]
 
 
-def bounds(joints: int, base: bool = False) -> jax.Array:
+def bounds(joints: int, base: bool = False) -> Float[Array, " size"]:
     """Largest |x_0| of a segment, times `CLIP`, [joints + 1], or with its base [2 joints + 1]."""
     segment = CLIP * jnp.append(jnp.full(joints, jnp.sqrt(float(joints))), 1.0)
     return jnp.append(segment, jnp.full(joints, FARTHEST)) if base else segment

@@ -7,6 +7,7 @@ out on purpose: there an error of eps enters x_0 two thousand times.
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Array, Float
 
 from jaxplan.diffusion.loss import Denoise
 from jaxplan.diffusion.schedule import alphas_cumprod
@@ -25,31 +26,31 @@ def timesteps(num_train_timesteps: int, num_inference_steps: int) -> np.ndarray:
 
 def ddim(
     denoise: Denoise,
-    x_T: jax.Array,
+    x_T: Float[Array, "*B size"],
     num_train_timesteps: int,
     steps: np.ndarray,
-    clip: float | jax.Array = jnp.inf,
-) -> jax.Array:
+    clip: float | Float[Array, "..."] = jnp.inf,
+) -> Float[Array, "*B size"]:
     """Carries noise x_T to a sample x_0 of the same shape.
 
     Args:
         denoise: (x_t, t) -> eps, with t an i32 scalar.
-        x_T: Standard normal noise [..., D].
+        x_T: Standard normal noise.
         num_train_timesteps: T of the schedule.
         steps: Noise steps visited, falling, as from `timesteps`.
-        clip: Bound on |x_0|, broadcastable to [..., D].
+        clip: Bound on |x_0|, broadcastable to x_0.
     """
     return ddim_path(denoise, x_T, num_train_timesteps, steps, clip)[1]
 
 
 def ddim_path(
     denoise: Denoise,
-    x_T: jax.Array,
+    x_T: Float[Array, "*B size"],
     num_train_timesteps: int,
     steps: np.ndarray,
-    clip: float | jax.Array = jnp.inf,
-) -> tuple[jax.Array, jax.Array]:
-    """The x_t of all steps [len(steps), ..., D], and x_0 [..., D]; arguments of `ddim`."""
+    clip: float | Float[Array, "..."] = jnp.inf,
+) -> tuple[Float[Array, "steps *B size"], Float[Array, "*B size"]]:
+    """The x_t of all steps, and x_0; arguments of `ddim`."""
     abar = alphas_cumprod(num_train_timesteps)[steps]
     abar_next = np.append(abar[1:], np.float32(1.0))
 

@@ -4,6 +4,7 @@ from collections.abc import Callable
 
 import jax
 import jax.numpy as jnp
+from jaxtyping import Array, Float, Key
 
 from jaxplan.diffusion.schedule import add_noise
 
@@ -12,9 +13,12 @@ Denoise = Callable[[jax.Array, jax.Array], jax.Array]
 
 
 def eps_loss(
-    key: jax.Array, denoise: Denoise, x_0: jax.Array, num_train_timesteps: int
-) -> jax.Array:
-    """Mean squared error of the noise, with t uniform and one draw per row of x_0 [B, D]."""
+    key: Key[Array, ""],
+    denoise: Denoise,
+    x_0: Float[Array, "B size"],
+    num_train_timesteps: int,
+) -> Float[Array, ""]:
+    """Mean squared error of the noise, with t uniform and one draw per row of x_0."""
     key_t, key_eps = jax.random.split(key)
     t = jax.random.randint(key_t, x_0.shape[:-1], 0, num_train_timesteps)
     eps = jax.random.normal(key_eps, x_0.shape)

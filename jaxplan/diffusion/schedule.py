@@ -1,8 +1,8 @@
 """The cosine noise schedule and the forward process."""
 
-import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Array, Float, Int
 
 
 def squaredcos_cap_v2(num_train_timesteps: int) -> np.ndarray:
@@ -19,8 +19,11 @@ def alphas_cumprod(num_train_timesteps: int) -> np.ndarray:
 
 
 def add_noise(
-    x_0: jax.Array, eps: jax.Array, t: jax.Array, num_train_timesteps: int
-) -> jax.Array:
-    """x_t = sqrt(abar_t) x_0 + sqrt(1 - abar_t) eps, for x_0 [..., D] and t [...]."""
+    x_0: Float[Array, "*B size"],
+    eps: Float[Array, "*B size"],
+    t: Int[Array, "*B"],
+    num_train_timesteps: int,
+) -> Float[Array, "*B size"]:
+    """x_t = sqrt(abar_t) x_0 + sqrt(1 - abar_t) eps."""
     abar = jnp.asarray(alphas_cumprod(num_train_timesteps))[t][..., None]
     return jnp.sqrt(abar) * x_0 + jnp.sqrt(1.0 - abar) * eps

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import jax
 import jax.numpy as jnp
 import optax
+from jaxtyping import Array, Float
 
 from jaxplan.base import Subgoal
 from jaxplan.networks import ERROR_SCALE, Prediction
@@ -32,15 +33,15 @@ def subgoal_loss(
     config: LossConfig,
     prediction: Prediction,
     targets: Subgoal,
-    camera_error: jax.Array | None = None,
-) -> tuple[jax.Array, dict[str, jax.Array]]:
+    camera_error: Float[Array, "B 5"] | None = None,
+) -> tuple[Float[Array, ""], dict[str, jax.Array]]:
     """Equation 1, averaged over the batch, and its terms before weighting.
 
     Args:
         config: Weights.
         prediction: Of the network; joints are scaled to [-1, 1].
         targets: Labels, likewise.
-        camera_error: [B, 5] labels, for a network that says it.
+        camera_error: Labels, for a network that says it.
     """
     terms = {
         "toggle": huber(prediction.q_toggle - targets.q_toggle, config.huber_kappa),
@@ -60,22 +61,22 @@ def subgoal_loss(
     return total, means
 
 
-def huber(error: jax.Array, kappa: float) -> jax.Array:
-    """Element-wise Huber of `error` [..., d], averaged over the joints."""
+def huber(error: Float[Array, "*B d"], kappa: float) -> Float[Array, "*B"]:
+    """Element-wise Huber, averaged over the joints."""
     size = jnp.abs(error)
     inside = 0.5 * size**2
     return jnp.where(size <= kappa, inside, kappa * (size - 0.5 * kappa)).mean(-1)
 
 
 def regularizer(
-    config: LossConfig, q_toggle: jax.Array, q_goal: jax.Array
-) -> jax.Array:
-    """R of equation 2: limits of both, and the distance between them, [...]."""
+    config: LossConfig, q_toggle: Float[Array, "*B d"], q_goal: Float[Array, "*B d"]
+) -> Float[Array, "*B"]:
+    """R of equation 2: limits of both, and the distance between them."""
     limits = limit_hinge(q_toggle, config.delta) + limit_hinge(q_goal, config.delta)
     near = jnp.sum((q_goal - q_toggle) ** 2, axis=-1)
     return config.lambda_lim * limits + config.lambda_prox * near
 
 
-def limit_hinge(q: jax.Array, delta: float) -> jax.Array:
-    """R_lim of equation 3 with limits at -1 and 1: squared excess over 1 - delta, [...]."""
+def limit_hinge(q: Float[Array, "*B d"], delta: float) -> Float[Array, "*B"]:
+    """R_lim of equation 3 with limits at -1 and 1: squared excess over 1 - delta."""
     return jnp.sum(jnp.maximum(0.0, jnp.abs(q) - (1.0 - delta)) ** 2, axis=-1)

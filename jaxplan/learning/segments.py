@@ -10,6 +10,7 @@ from typing import NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Array, Float, Key
 
 from jaxplan.data import NO_PATH, Shard
 from jaxplan.planning.segment import Segment
@@ -41,9 +42,9 @@ def path_rows(shard: Shard, rows: np.ndarray) -> PathRows:
 
 
 def training_segments(
-    key: jax.Array, paths: PathRows, step_min: float, step_max: float
-) -> tuple[jax.Array, Segment]:
-    """One base [B, d] [rad] and one segment of each path; base + s u lies on the path.
+    key: Key[Array, ""], paths: PathRows, step_min: float, step_max: float
+) -> tuple[Float[Array, "B d"], Segment]:
+    """One base [rad] and one segment of each path; base + s u lies on the path.
 
     s is the straight distance to the point a drawn arc further, hence at most that arc.
     """
@@ -59,8 +60,8 @@ def training_segments(
     return base, Segment(delta / jnp.maximum(length, 1e-6)[..., None], length)
 
 
-def point_at(paths: PathRows, arc: jax.Array) -> jax.Array:
-    """Points of the paths at arc positions [B] [rad], `[B, d]` [rad]."""
+def point_at(paths: PathRows, arc: Float[Array, " B"]) -> Float[Array, "B d"]:
+    """Points of the paths at arc positions [rad]."""
     last = paths.q.shape[-2] - 1
     place = jnp.clip(arc / jnp.maximum(paths.length, 1e-6), 0.0, 1.0) * last
     low = jnp.minimum(place.astype(jnp.int32), last - 1)

@@ -144,6 +144,10 @@ def advance(
         segment = jax.tree.map(lambda leaf: at(leaf, row), bank)
 
     move = method.propose(control, draw, asking, segment, problems, config)
+    if segment.base is not None:  # a learned segment may lead out of the limits
+        target = move.proposal.target
+        inside = jnp.where(move.learned[..., None], space.project(target), target)
+        move = move._replace(proposal=move.proposal._replace(target=inside))
     follows = jnp.where(
         move.learned, segment.base is not None, config.greedy & move.proposal.toward
     )

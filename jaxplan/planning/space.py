@@ -6,6 +6,7 @@ import math
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Array, Float
 from numpy.typing import ArrayLike
 
 ROAM = 10.0
@@ -23,14 +24,14 @@ def rounded(product: jax.Array) -> jax.Array:
     return jnp.maximum(product, -jnp.finfo(jnp.float32).max)
 
 
-def dot(a: jax.Array, b: jax.Array) -> jax.Array:
-    """Products over the last axis `[..., d]`, summed joint by joint."""
+def dot(a: Float[Array, "... d"], b: Float[Array, "... d"]) -> Float[Array, "..."]:
+    """Products over the last axis, summed joint by joint."""
     products = rounded(a * b)
     return sum(products[..., j] for j in range(products.shape[-1]))  # type: ignore
 
 
-def norm(vectors: jax.Array) -> jax.Array:
-    """Lengths over the last axis `[..., d]`."""
+def norm(vectors: Float[Array, "*B d"]) -> Float[Array, "*B"]:
+    """Lengths over the last axis."""
     return jnp.sqrt(dot(vectors, vectors))
 
 

@@ -2,8 +2,8 @@
 
 from typing import Any
 
-import jax
 import jax.numpy as jnp
+from jaxtyping import Array, Key
 
 from jaxplan.learning.train_state import Params
 from jaxplan.networks import AnyCond, Cond, SceneCond, SegmentConfig
@@ -33,7 +33,7 @@ def family_of(config: Any) -> Family:
 
 def init(
     config: SegmentConfig,
-    key: jax.Array,
+    key: Key[Array, ""],
     image: tuple[int, ...] = (),
     training: bool = True,
 ) -> Params:
@@ -61,7 +61,7 @@ def _blank(config: SegmentConfig, image: tuple[int, ...]) -> AnyCond:
 
 
 def draw(
-    config: SegmentConfig, params: dict, cond: AnyCond, keys: jax.Array, n: int
+    config: SegmentConfig, params: dict, cond: AnyCond, keys: Key[Array, " P"], n: int
 ) -> Segment:
     """`n` segments for each of P problems, in one batch.
 
@@ -71,7 +71,7 @@ def draw(
         config: The network that `params` belongs to; its type says which family.
         params: Weights.
         cond: AnyConditions with leading axis P.
-        keys: Typed keys [P]. Problem p's segments depend on its own key and condition only.
+        keys: Problem p's segments depend on its own key and condition only.
         n: Segments per problem.
 
     Returns:
