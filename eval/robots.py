@@ -25,7 +25,7 @@ from parts.robot_models import ROBOTS, Robot, find, load
 from tqdm import tqdm
 
 from jaxplan.cli import run_script
-from jaxplan.collision import World, clearance_mujoco, closest_pair, make_world
+from jaxplan.collision import World, clearance_mujoco, make_world, tightest_pair
 from jaxplan.collision.touching import random_poses
 from jaxplan.config import PlannerConfig
 from jaxplan.evaluation.result import write_result
@@ -189,9 +189,11 @@ def solve(planner: Planner, world: World, q: np.ndarray, row: Row, args: Args) -
                 row.untrue.append(f"problem {i}: {certificate}")
         elif name in ("START_IN_COLLISION", "GOAL_IN_COLLISION"):
             at = start if name.startswith("START") else goal
-            pair, depth = closest_pair(planner.scene, world, at)
+            pair, depth, required = tightest_pair(planner.scene, world, at, margin)
             true = (
-                depth <= margin + BAND and pair and all(p in plan.reason for p in pair)
+                depth <= required + BAND
+                and pair
+                and all(p in plan.reason for p in pair)
             )
             row.refused += bool(true)
             if not true:

@@ -35,7 +35,7 @@ class PlannerConfig(Checked):
     shorter paths (`planning.methods`)."""
     max_expansions: Count = 50_000
     """N_rrt: proposals whose motion is checked, each connect step included."""
-    p_uniform: Probability = 0.2
+    p_uniform: Probability = 0.5
     """Probability that a proposal is a uniform segment and not a learned one, if there is a
     sampler."""
     tree_context: bool = True
@@ -86,6 +86,7 @@ class PlannerConfig(Checked):
 
 PAPER_PLANNER = PlannerConfig(
     max_expansions=500,
+    p_uniform=0.2,
     step_min=0.05,
     step_max=0.2,
     balance=False,

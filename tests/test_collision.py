@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from mug_worlds import random_world
 
+from jaxplan import cli
 from jaxplan.collision import (
     XLA_OPTIONS,
     World,
@@ -18,7 +19,9 @@ from jaxplan.collision import (
     make_world,
     motion_free,
     required_clearances,
+    tightest_pair,
 )
+from jaxplan.motion import Planner
 from jaxplan.planning import points_for
 from jaxplan.robots import PANDA
 from jaxplan.scene import Scene
@@ -291,6 +294,39 @@ def test_the_margins_of_the_model_count_as_in_mujoco(override: bool):
     tip, ball, wall = (scene.mj_model.geom(n).id for n in ("tip", "ball", "wall"))
     expected = [0.04, 0.04] if override else [0.025, 0.05]
     np.testing.assert_allclose(table[[tip, tip], [ball, wall]], expected, rtol=1e-6)
+
+
+def test_what_is_too_near_is_named_with_what_it_should_keep(tmp_path, capsys):
+    """By the planner and by `jaxplan check`: not the nearest pair, if that may be so near."""
+    text = MARGINS.replace('pos="-.5 0 0"', 'pos=".16 .3 .165"')
+    scene = Scene.from_mjcf(text)
+    model, world, planner = scene.mj_model, make_world(scene), Planner(scene)
+    required = np.asarray(required_clearances(scene))
+    data, q = mujoco.MjData(model), uniform(scene, np.random.default_rng(9), 6000)
+    distance = np.asarray(fast_clearance(scene, world, q))
+    pairs = [[model.geom(name).id for name in names] for _, *names in scene.pairs]
+    not_nearest = 0
+    for row in q[(distance > 1e-4) & ~np.asarray(fast_free(scene, world, q))][:80]:
+        data.qpos[:] = row
+        mujoco.mj_kinematics(model, data)
+        apart = [mujoco.mj_geomDistance(model, data, i, j, 1, None) for i, j in pairs]
+        short = np.array([required[i, j] for i, j in pairs]) - apart
+        i, j = pairs[int(short.argmax())]
+        found = tightest_pair(scene, world, row, 0.0)
+        assert set(found.pair or ()) == {model.geom(i).name, model.geom(j).name}
+        np.testing.assert_allclose(
+            found.required - found.distance, short.max(), atol=1e-5
+        )
+        not_nearest += int(np.argmin(apart)) != int(short.argmax())
+        reason = planner.plan(row, row).reason
+        words = f"apart, margin {1000 * required[i, j]:.2f} mm"
+        assert reason.startswith("start in collision: ")
+        assert words in reason
+    assert not_nearest > 3
+    path = tmp_path / "margins.xml"
+    path.write_text(text)
+    assert cli.main(["check", str(path), "--at", ",".join(map(str, row))]) == 1
+    assert "too near" in capsys.readouterr().out
 
 
 def test_pairs_that_are_always_near_keep_no_margin_beyond_it():

@@ -3,6 +3,7 @@
 from jaxplan.collision.certify import Certificate as Certificate
 from jaxplan.collision.certify import certify as certify
 from jaxplan.collision.closest import closest_pair as closest_pair
+from jaxplan.collision.closest import tightest_pair as tightest_pair
 from jaxplan.collision.engine import XLA_OPTIONS as XLA_OPTIONS
 from jaxplan.collision.margins import required_clearances as required_clearances
 from jaxplan.collision.obstacles import Obstacle as Obstacle

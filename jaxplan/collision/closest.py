@@ -1,10 +1,13 @@
 """Which pair is nearest, by both distances: C MuJoCo's and our own."""
 
+from typing import NamedTuple
+
 import numpy as np
 import numpy.typing as npt
 
 from jaxplan.collision.checks import checked
-from jaxplan.collision.oracle import Replica, names_of, nearest
+from jaxplan.collision.margins import required_clearances
+from jaxplan.collision.oracle import Replica, contacts_of, names_of, nearest
 from jaxplan.collision.rows import clearance_rows
 from jaxplan.collision.world import World
 from jaxplan.ranges import NotNegative, check
@@ -38,6 +41,47 @@ def closest_pair(
     if theirs < 0:
         return names_of(scene, geoms), theirs
     return worst_pair(scene, world, row[0], reach)
+
+
+class Tight(NamedTuple):
+    """The pair that makes a configuration not free."""
+
+    pair: tuple[str, str] | None
+    """By name."""
+    distance: float
+    """Signed [m]."""
+    required: float
+    """More than this would be free [m]."""
+
+
+def tightest_pair(
+    scene: Scene, world: World, q: npt.ArrayLike, margin: float, reach: float = 0.01
+) -> Tight:
+    """Of what is not free at q, the pair that is nearest for what it should keep.
+
+    Not always the nearest: the model may ask for more between some geoms than between others
+    (`required_clearances`). Where nothing overlaps, and C MuJoCo's distances are all that is
+    required, our own is asked, as by `closest_pair`.
+
+    Args:
+        scene: The scene.
+        world: One world, without batch axes.
+        q: `[d]` joints [rad].
+        margin: The user's [m].
+        reach: Pairs farther apart than this and than any margin are not looked for [m].
+    """
+    pair, distance = closest_pair(scene, world, q, reach)
+    if distance < 0:
+        return Tight(pair, distance, 0.0)
+    required = np.asarray(required_clearances(scene, margin))
+    row, reach = np.asarray(q, float)[None], max(reach, float(required.max()))
+    apart, geoms = next(contacts_of(scene, world, row, reach))
+    kept = required[geoms[:, 0], geoms[:, 1]]
+    if len(apart) and (apart - kept).min() <= 0:
+        worst = int(np.argmin(apart - kept))
+        i, j = map(int, geoms[worst])
+        return Tight(names_of(scene, (i, j)), float(apart[worst]), float(kept[worst]))
+    return Tight(pair, distance, margin)
 
 
 def worst_pair(scene: Scene, world: World, q: np.ndarray, reach: float) -> Named:

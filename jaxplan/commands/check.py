@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from jaxplan.collision import always_touching, closest_pair
+from jaxplan.collision import always_touching, closest_pair, tightest_pair
 from jaxplan.commands.model import (
     NamedPose,
     chains,
@@ -116,9 +116,10 @@ def _show_limits(scene: Scene, pose: NamedPose) -> bool:
 
 
 def _show_contacts(scene: Scene, pose: NamedPose) -> bool:
-    """Lists the closest geoms of each pair of bodies, by C MuJoCo; whether none collide."""
+    """Lists the closest geoms of each pair of bodies, by C MuJoCo; whether the pose is free."""
     group_of = {frozenset(pair): group for group, *pair in scene.pairs}
     world, nearest = world_at(scene, pose), []
+    tight = tightest_pair(scene, world, pose.q, 0.0)
     while len(nearest) < len(scene.groups):
         pair, distance = closest_pair(scene, world, pose.q, REACH)
         if pair is None or (distance >= 0 and len(nearest) >= SHOWN):
@@ -127,11 +128,20 @@ def _show_contacts(scene: Scene, pose: NamedPose) -> bool:
         met = scene.ignored([group_of[frozenset(pair)]])
         world = world._replace(ignored=np.asarray(world.ignored) | met)
     deep = sum(distance < 0 for distance, _ in nearest)
-    verdict = f"in collision, {deep} of the pairs of bodies" if deep else "free"
+    free = tight.pair is None or tight.distance > tight.required
+    if deep:
+        verdict = f"in collision, {deep} of the pairs of bodies"
+    elif not free and tight.pair:
+        verdict = (
+            f"too near, {' and '.join(tight.pair)}: {1000 * tight.distance:.2f} mm, "
+            f"the model's margin is {1000 * tight.required:.2f} mm"
+        )
+    else:
+        verdict = "free"
     print(f"pose {pose.name}: {verdict}")
     for distance, names in nearest:
         print(f"  {1000 * distance:8.2f} mm  {names}")
-    return not deep
+    return free
 
 
 def _suggest_excludes(scene: Scene) -> None:

@@ -196,9 +196,6 @@ class Planner:
 
         Where joints come round, a path may end full turns from its goal. Plans that are not
         solved stay as they are.
-
-        Raises:
-            ValueError: What is no plan.
         """
         refuse_fork()
         for plan in plans:

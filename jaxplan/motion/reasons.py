@@ -137,20 +137,20 @@ REASONS: dict[Status, Callable[[Asked], str]] = {
 
 
 def _contact(scene: Scene, world: World, q: np.ndarray, margin: float) -> str:
-    """The closest pair at q, by name, and how deep it is."""
+    """What makes q not free, by name: how deep it is, or how near for what it should keep."""
     if not all(np.isfinite(np.asarray(leaf)).all() for leaf in world):
         return "the world has values that are not finite"
     poses = np.concatenate([world.object_pose, world.slot_pose])
     if not poses[:, 3:].any(-1).all():
         return "the world has a quaternion of zeros"
-    pair, distance = collision.closest_pair(scene, world, q, 0.01)
+    pair, distance, required = collision.tightest_pair(scene, world, q, margin)
     hint = "" if pair is None else _hint(scene, pair)
     if pair is None:
         return "nothing within 10 mm by C MuJoCo"
     if distance >= 0:
         return (
             f"{pair[0]} and {pair[1]} are {1000 * distance:.2f} mm apart, "
-            f"margin {1000 * margin:.2f} mm{hint}"
+            f"margin {1000 * required:.2f} mm{hint}"
         )
     return f"{pair[0]} and {pair[1]}, {-1000 * distance:.2f} mm deep{hint}"
 
