@@ -96,6 +96,26 @@ def first_solutions(found: Found) -> Table:
     )
 
 
+def scene_sampler(found: Found) -> Table:
+    """With `few_step`, and with none: all sets, and the hardest."""
+    rows = found["scene_sampler"]["rows"]
+    columns = [
+        "problems",
+        "solved",
+        "expansions",
+        "none",
+        "checks to none",
+        "to none [ms]",
+    ]
+    body: list[list[Any]] = []
+    for name in ("all", "cage"):
+        ours, none = rows[name]["few_step"], rows[name]["none"]
+        solved = f"{ours['solved']} of {ours['of']}"
+        counts = [ours["expansions"], none["expansions"], ours["checks_ratio"]]
+        body.append([name, solved, *counts, ours["ms_ratio"]])
+    return Table("", columns, body)
+
+
 def speed(found: Found) -> Table:
     """MotionBenchMaker: ours beside the better of OMPL's ranges."""
     robots = {"motion_bench": "Panda", "motion_bench_fetch": "Fetch"}
