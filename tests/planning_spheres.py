@@ -164,6 +164,7 @@ class Oracle:
                 if self.segments.base is not None:
                     begin = np.asarray(self.segments.base[self.used - 1])
                     end = begin + s * u if side == 0 else begin
+                    end = np.clip(end, -Q_MAX, Q_MAX)
                     target, direction = end, None
                 s = np.clip(s, config.step_min, config.step_max)
                 base = self.nearest(target, side, config.toggle_tie_break > 0)

@@ -3,6 +3,8 @@
 import dataclasses
 import json
 import pickle
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -249,6 +251,7 @@ def test_joints_that_come_round_are_told_alike_whatever_their_turn():
 
 
 @pytest.mark.parametrize("name", FAMILIES)
+@pytest.mark.long
 def test_any_weights_leave_the_planner_complete_and_alike_in_batches(
     name, planner, shard
 ):
@@ -302,6 +305,7 @@ def test_weights_that_see_pictures_are_refused():
 # The door
 
 
+@pytest.mark.long
 def test_from_a_description_to_a_guided_plan(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     Path("cell.json").write_text(json.dumps(CELL))
@@ -377,3 +381,17 @@ def test_weights_of_a_scene_survive_the_disk(tmp_path, shard, planner):
     assert read.scene == identity(planner.scene)
     assert read.bank.config == weights.config
     assert dataclasses.asdict(read.bank.config)["surroundings"]["thing"] > 0
+
+
+@pytest.mark.slow
+def test_the_script_that_compares_samplers_solves_everything(tmp_path):
+    """Quick, on the tutorial's cell; hardly trained samplers cost time and no answer."""
+    root = ARM.parents[1]
+    command = [sys.executable, str(root / "eval" / "scene_sampler.py"), "--quick"]
+    command += ["--cell", str(ARM), "--description", str(root / "docs" / "cell.json")]
+    command += ["--work", "work", "--out", "out.json"]
+    subprocess.run(command, cwd=tmp_path, check=True)
+    rows = json.loads((tmp_path / "out.json").read_text())["rows"]
+    assert {*rows} == {"cell", "all"}
+    for row in rows["all"].values():
+        assert row["solved"] == row["of"] == 2

@@ -296,6 +296,7 @@ def test_the_margins_of_the_model_count_as_in_mujoco(override: bool):
     np.testing.assert_allclose(table[[tip, tip], [ball, wall]], expected, rtol=1e-6)
 
 
+@pytest.mark.long
 def test_what_is_too_near_is_named_with_what_it_should_keep(tmp_path, capsys):
     """By the planner and by `jaxplan check`: not the nearest pair, if that may be so near."""
     text = MARGINS.replace('pos="-.5 0 0"', 'pos=".16 .3 .165"')

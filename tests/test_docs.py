@@ -17,7 +17,11 @@ ROOT = Path(__file__).parents[1]
 
 @pytest.mark.parametrize(
     ("document", "directory"),
-    [("README.md", "."), ("docs/index.md", "docs"), ("docs/tutorial.md", "docs")],
+    [
+        ("README.md", "."),
+        ("docs/index.md", "docs"),
+        pytest.param("docs/tutorial.md", "docs", marks=pytest.mark.long),
+    ],
 )
 def test_python_blocks_run(document, directory, monkeypatch):
     monkeypatch.chdir(ROOT / directory)
@@ -31,6 +35,7 @@ def test_python_blocks_run(document, directory, monkeypatch):
         exec(compile(before + block[1], document, "exec"), names)
 
 
+@pytest.mark.long
 def test_the_commands_for_a_sampler_of_ones_own_run(monkeypatch, tmp_path):
     """docs/sampler.md, in its order, at a small size; and what it says of the JSON is true."""
     text = (ROOT / "docs/sampler.md").read_text(encoding="utf-8")

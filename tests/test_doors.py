@@ -427,6 +427,7 @@ def copies(thing):
 
 
 @pytest.mark.parametrize("sampler", [None, up])
+@pytest.mark.long
 def test_a_used_planner_is_copied_and_answers_alike(scene, sampler):
     limits = {"velocity": [1.0, 2.0], "acceleration": 3.0, "q_min": [-0.9, -1.9]}
     planner = Planner(scene, SMALL, sampler=sampler, **limits)

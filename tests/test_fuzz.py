@@ -26,6 +26,7 @@ def quick(monkeypatch):
 
 @pytest.mark.parametrize("seed", ASKED)
 @pytest.mark.usefixtures("quick")
+@pytest.mark.long
 def test_whole_questions_have_right_answers(seed: int):
     scene = random_scene(seed, SMALL).read()
     world = random_world(scene, np.random.default_rng(seed))

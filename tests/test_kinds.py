@@ -155,6 +155,7 @@ def test_a_geom_of_explicit_pairs_meets_every_slot():
     np.testing.assert_allclose(ask(scene, world, q), [0.1, 0.1, 0.2], atol=1e-6)
 
 
+@pytest.mark.long
 def test_the_planner_answers_whole_questions():
     scene, world = build(Case(("box",), (), ("capsule",)))
     planner = jaxplan.Planner(scene)

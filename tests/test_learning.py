@@ -304,6 +304,7 @@ def test_configs_survive_json():
 # The door
 
 
+@pytest.mark.long
 def test_the_door_trains_both_networks(demos, tmp_path, monkeypatch):
     """The debug recipe from demonstrations to weights, and a resume that has nothing to do."""
     monkeypatch.chdir(tmp_path)
@@ -390,6 +391,7 @@ def test_killed_process_resumes(demos, tmp_path):
         np.testing.assert_allclose(a, b, atol=1e-6)
 
 
+@pytest.mark.long
 def test_training_starts_from_given_weights(demos, tmp_path, monkeypatch, capsys):
     """With a learning rate of zero, what comes out is what went in."""
     monkeypatch.chdir(tmp_path)
@@ -414,6 +416,7 @@ def test_training_starts_from_given_weights(demos, tmp_path, monkeypatch, capsys
     assert "see params/" in said
 
 
+@pytest.mark.long
 def test_a_calibrating_predictor_starts_from_one_that_does_not(
     demos, tmp_path, monkeypatch
 ):

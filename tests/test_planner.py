@@ -314,6 +314,7 @@ def test_a_sampler_of_ones_own_guides_the_search(scene):
 
 @pytest.mark.parametrize("method", ["rrt", "rrt_connect", "ao_rrt_connect"])
 @pytest.mark.parametrize("beyond", ["end", "base"])
+@pytest.mark.long
 def test_a_sampler_cannot_lead_out_of_the_limits(scene, method, beyond):
     """Its segments end, or begin, beyond them; trees take one or the other for where to go."""
 

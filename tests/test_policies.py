@@ -241,6 +241,7 @@ def command(kind: str, demos: str) -> list[str]:
 
 
 @pytest.mark.parametrize("kind", ["diffusion_policy", "lstm_gmm", "transformer"])
+@pytest.mark.long
 def test_a_killed_training_ends_with_the_same_bits(
     kind, trained, timed_demos, tmp_path, monkeypatch
 ):

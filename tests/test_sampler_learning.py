@@ -33,6 +33,7 @@ def weights(kind: str, training: bool = True) -> dict:
     return init(DEBUG[kind].network, jax.random.key(0), (12,), training)
 
 
+@pytest.mark.long
 def test_a_gan_has_two_players():
     """Neither network's gradient contains the other's loss."""
     params, batch = weights("gan"), phases()
@@ -102,6 +103,7 @@ def command(kind: str, demos: str) -> list[str]:
 
 
 @pytest.mark.parametrize("kind", SAMPLERS)
+@pytest.mark.long
 def test_the_door_trains_every_sampler(kind, trained):
     upper, lower = pretrained.load_pair(trained, kind)
     assert lower.config == DEBUG[kind].network

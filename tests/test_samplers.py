@@ -124,6 +124,7 @@ def test_few_steps_part_the_teachers_way():
         few_step.timesteps(FewStepConfig(num_inference_steps=97))
 
 
+@pytest.mark.long
 def test_trained_weights_guide_the_public_planner():
     """By a bank under one observation: alone, in a batch and in a copy the same answer."""
     weights = load_weights("sampler")

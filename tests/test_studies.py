@@ -221,6 +221,7 @@ def test_banks_are_what_the_agent_draws():
         np.testing.assert_array_equal(ours, theirs[np.array([2, 0, 1])])
 
 
+@pytest.mark.long
 def test_networks_say_the_same_to_the_last_bit_whoever_is_beside():
     """Alone, and in batches of other sizes: subgoals, features and segments."""
     predictor, sampler = load_pair()
