@@ -318,7 +318,7 @@ def test_the_report_shows_every_figure_and_says_where_ours_is_worse(tmp_path):
     (tmp_path / "expansions_plain.json").write_text(json.dumps(content))
     pages = report(tmp_path, tmp_path)
     page = pages["docs/results/expansions.md"]
-    assert "- CVAE needs 0.50 of our expansions" in pages["RESULTS.md"]
+    assert "aim: CVAE needs 0.50 of our expansions." in pages["RESULTS.md"]
     assert "1.50 (1 to 2)" in page or "1.50 (1.00 to 2.00)" in page
     assert "`python eval/expansions.py`; 2026-01-02; seeds 1:2" in page
     assert "Not measured: `python eval/proposal_time.py`" in pages["RESULTS.md"]
