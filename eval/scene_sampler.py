@@ -17,6 +17,7 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import partial
+from itertools import cycle
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -230,10 +231,10 @@ class Mistaken:
 
     def for_scene(self, scene: Scene) -> Proposals:
         """Proposals for the next of its worlds in turn."""
-        proposals, turn = self._sampler.for_scene(scene), iter(range(10**9))
+        proposals, turn = self._sampler.for_scene(scene), cycle(self._worlds)
 
         def wrong(q_start: Any, q_goal: Any, keys: jax.Array, world: World) -> Any:
-            told = self._worlds[next(turn) % len(self._worlds)]
+            told = next(turn)
             same = np.array_equal(told.slot_pose, world.slot_pose)
             return proposals(q_start, q_goal, keys, self._worlds[0] if same else told)
 

@@ -60,7 +60,7 @@ class Bank:
         """Banks of P problems, with fresh noise for each number.
 
         Args:
-            cond: AnyConditions, leaves `[P, ...]`.
+            cond: Conditions, leaves `[P, ...]`.
             keys: Typed, `[P]`. A problem's segments depend on its own key and condition only.
             alike: To the last bit, whatever P is. On a CPU they always are, which costs a
                 quarter more; elsewhere it is slow where P is large.

@@ -70,7 +70,7 @@ def draw(
     Args:
         config: The network that `params` belongs to; its type says which family.
         params: Weights.
-        cond: AnyConditions with leading axis P.
+        cond: Conditions with leading axis P.
         keys: Problem p's segments depend on its own key and condition only.
         n: Segments per problem.
 

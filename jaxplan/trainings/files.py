@@ -1,7 +1,6 @@
 """What goes into a training and what comes out: data with its origin, weights before and after."""
 
 import dataclasses
-import logging
 from pathlib import Path
 from typing import Any
 
@@ -18,8 +17,6 @@ from jaxplan.scene.identity import difference
 
 RUNS = Path("runs")
 """Each run has a directory there."""
-
-logger = logging.getLogger(__name__)
 
 
 def read(config: TrainConfig, kind: type) -> tuple[Any, dict[str, Any]]:
