@@ -32,6 +32,7 @@ from jaxplan import (
 )
 from jaxplan import make_world as world_for
 from jaxplan.episodes import EpisodeConfig
+from jaxplan.ik import Limits
 from jaxplan.learning import SegmentTraining, TrainConfig
 from jaxplan.learning.policy import PolicyTraining
 from jaxplan.motion.blocks import SIZES
@@ -398,11 +399,11 @@ def test_a_reason_says_what_joints_are_measured_in(joints, unit):
     scene = Scene.from_mjcf(ARM, joints=joints)
     d = len(scene.joints)
     goal = np.append(np.zeros(d - 1), 0.5)
-    limits = -np.ones(d), np.ones(d)
+    limits = Limits(-np.ones(d), np.ones(d), np.zeros(d, bool))
     plan = Plan(Status.BUDGET_EXHAUSTED, np.zeros((1, d)), 9, 9, 0.0, "", 0, None)
     goals = Goals(goal[None], 1, None, goal[None][:0])
     nodes = np.array([5, 5])
-    asked = Asked(scene, plan, goal, goals, limits, 0.0, nodes)
+    asked = Asked(scene, plan, goal, goals, limits, 0.0, nodes, None)
     assert f"is {unit} from" in no_path(asked)
     plan = dataclasses.replace(plan, status=Status.OUT_OF_LIMITS)
     said = no_path(asked._replace(plan=plan, q_start=3 * np.ones(d)))

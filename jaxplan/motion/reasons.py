@@ -3,19 +3,24 @@
 from collections.abc import Callable
 from typing import NamedTuple
 
+import jax.numpy as jnp
 import numpy as np
 
 from jaxplan import collision
 from jaxplan.collision import World
+from jaxplan.collision.oracle import contacts_of, names_of
+from jaxplan.ik import Limits
+from jaxplan.motion.barriers import FEW, Free, barrier_between
 from jaxplan.motion.goals import Goals
 from jaxplan.motion.plan import Plan
 from jaxplan.planning import Status
+from jaxplan.planning.space import Space
 from jaxplan.scene import Scene
 
 UNITS = {"hinge": "rad", "slide": "m"}
 """Of a joint's position, by its kind."""
-ENCLOSED = 1000
-"""Expansions in which a tree should have grown."""
+ENOUGH = 1000
+"""Expansions after which something may be in the way for good."""
 
 
 class Asked(NamedTuple):
@@ -26,12 +31,14 @@ class Asked(NamedTuple):
     q_start: np.ndarray
     """`[d]` [rad or m]."""
     goals: Goals
-    limits: tuple[np.ndarray, np.ndarray]
-    """`(q_min [d], q_max [d])` of the search [rad or m]."""
+    limits: Limits
+    """Of the search."""
     margin: float
     """Clearance that counted as free [m]."""
     nodes: np.ndarray
     """`[2]` of the start's tree and of the goal's."""
+    free: Free | None
+    """Of its world; None where there is no time to look for what hinders."""
 
     @property
     def ends(self) -> dict[str, np.ndarray]:
@@ -64,26 +71,49 @@ def joint_distance(scene: Scene, distance: float) -> str:
 def _searched(asked: Asked) -> str:
     """Of a search that ended before it was there."""
     scene, plan = asked.scene, asked.plan
-    gap = asked.goals.q - plan.path[-1]
-    gap = np.where(scene.circular, (gap + np.pi) % (2 * np.pi) - np.pi, gap)
-    least = float(np.linalg.norm(gap, axis=1).min())
+    space = Space.of(*asked.limits)
+    gap = space.gap(jnp.asarray(plan.path[-1]), jnp.asarray(asked.goals.q))
+    least = float(jnp.linalg.norm(gap, axis=1).min())
     spent = f"{plan.expansions} expansions"
     if plan.status == Status.TIME_OUT:
         spent = f"{plan.time:.3f} s and {spent}"
     near = f"the nearest node is {joint_distance(scene, least)} from the goal"
-    return f"no path after {spent}; {near}{_enclosed(asked)}"
+    hindered = ""
+    if plan.expansions >= ENOUGH:
+        hindered = _enclosed(asked) or _barred(asked, space)
+    return f"no path after {spent}; {near}{hindered}"
 
 
 def _enclosed(asked: Asked) -> str:
     """Says so where a tree could not grow."""
     grown = asked.nodes - (1, len(asked.goals.q))
     for end, nodes in zip(("start", "goal"), grown.tolist(), strict=True):
-        if nodes <= 0 < asked.plan.expansions - ENCLOSED:
+        if nodes <= 0:
             return (
                 f"; the {end} seems enclosed: not one of the motions from it that were "
                 "tried is free"
             )
     return ""
+
+
+def _barred(asked: Asked, space: Space) -> str:
+    """Names a joint that hinders every way, if there is one."""
+    found = None
+    if asked.free is not None:
+        found = barrier_between(asked.free, asked.q_start, asked.goals.q, space)
+    if found is None:
+        return ""
+    scene, world = asked.scene, asked.plan.world
+    joint = scene.joints[found.joint]
+    at = " and ".join(with_unit(scene, joint, x) for x in found.positions)
+    said = (
+        f"; no path may exist: on every way from start to goal joint {joint!r} passes {at}, "
+        f"where none of {len(found.q)} random configurations is free"
+    )
+    contacts = contacts_of(scene, world, found.q[:FEW], asked.margin)
+    always = set.intersection(*({*map(tuple, geoms.tolist())} for _, geoms in contacts))
+    pairs = [" and ".join(names_of(scene, pair) or ()) for pair in sorted(always)[:1]]
+    return said + "".join(f": {pair} touch" for pair in pairs)
 
 
 def _start_in_collision(asked: Asked) -> str:
@@ -106,7 +136,7 @@ def _unreachable(asked: Asked) -> str:
 
 
 def _out_of_limits(asked: Asked) -> str:
-    q_min, q_max = asked.limits
+    q_min, q_max, _ = asked.limits
     over = {n: np.maximum(q_min - q, q - q_max) for n, q in asked.ends.items()}
     end = max(over, key=lambda name: over[name].max())
     j = int(np.argmax(over[end]))

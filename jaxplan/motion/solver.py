@@ -1,6 +1,7 @@
 """Checked problems in, plans with reasons out: goals are read, searched for, and told of."""
 
 import dataclasses
+import math
 import time
 from collections.abc import Sequence
 from functools import partial
@@ -106,6 +107,7 @@ class Solver:
                 seconds,
                 seeds[row],
                 worlds[row],
+                math.isinf(time_limit),
             )
             for row in range(count)
         ]
@@ -118,6 +120,7 @@ class Solver:
         seconds: float,
         seed: int,
         world: World,
+        unhurried: bool,
     ) -> Plan:
         """One problem's answer, with its reason."""
         q_start, goals = asked
@@ -140,8 +143,9 @@ class Solver:
             near,
             q_start,
             goals,
-            self._limits[:2],
+            self._limits,
             self._config.margin,
             np.asarray(answer.nodes),
+            partial(self._search.free, world) if unhurried else None,
         )
         return dataclasses.replace(plan, reason=no_path(problem))
