@@ -68,8 +68,8 @@ class Scene(NamedTuple):
 class Recorder:
     """Listens to the loop and keeps every phase's picture."""
 
-    def __init__(self, loop: ClosedLoop, paint: Painter) -> None:
-        self._loop, self._paint = loop, paint
+    def __init__(self, paint: Painter) -> None:
+        self._paint = paint
         self.scenes: dict[int, list[Scene]] = {}
 
     def __call__(self, phase: Phase) -> None:
@@ -79,8 +79,7 @@ class Recorder:
             gripper = int(phase.observation.gripper[e])
             stage = before[-1].stage if before else 0
             stage += stage % 2 != gripper
-            qpos = self._loop.task.sim.data[e].qpos
-            moment = self._paint.moment(phase, e, qpos)
+            moment = self._paint.moment(phase, e)
             if (draw := phase.action.decision.draw) is not None:
                 nodes = self._paint.proposed(phase, e, draw, 96)
                 moment = moment._replace(proposals=self._paint.dots(nodes))
@@ -96,14 +95,14 @@ def main(args: Args) -> None:
     config = ClosedLoopConfig(task=args.task, variant=args.variant, batch=len(seeds))
     loop = ClosedLoop(weights, config)
     paint = Painter(loop.task, "near", scale=2)
-    recorder = Recorder(loop, paint)
+    recorder = Recorder(paint)
     result = loop.run(seeds, listen=recorder)
     solved = [e for e, row in enumerate(result["episodes"]) if row["success"]]
     if not solved:
         raise ValueError(f"none of the episodes {args.seeds} succeeded: other --seeds?")
     args.out.mkdir(parents=True, exist_ok=True)
     episodes = [recorder.scenes[e] for e in solved]
-    end = Moment(loop.task.sim.data[solved[0]].qpos.copy())
+    end = paint.now(solved[0])
     names = [str(seeds[e]) for e in solved]
     for number in args.figures:
         if number == 2:

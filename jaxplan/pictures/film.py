@@ -31,7 +31,7 @@ class Film:
 
     def add_phase(self, phase: Phase) -> None:
         """A panel: the scene at the start of a phase, targets and proposals drawn in."""
-        moment = self._painter.moment(phase, 0, self._task.sim.data[0].qpos)
+        moment = self._painter.moment(phase, 0)
         if (draw := phase.action.decision.draw) is not None:
             nodes = self._painter.proposed(phase, 0, draw)
             moment = moment._replace(proposals=self._painter.dots(nodes))
@@ -52,7 +52,8 @@ class Film:
         write_video(directory / "episode.mp4", frames, round(VIDEO_FPS))
 
     def _frame(self, qpos: np.ndarray) -> np.ndarray:
-        return np.asarray(self._painter.picture(Moment(qpos)))
+        model = self._task.sim.data[0].model
+        return np.asarray(self._painter.picture(Moment(model, qpos)))
 
     def _record(self, episode: int, data: mujoco.MjData) -> None:
         self._ticks += 1

@@ -41,6 +41,8 @@ class Mark(NamedTuple):
 class Moment(NamedTuple):
     """An episode at the start of a phase, or after its last."""
 
+    model: mujoco.MjModel
+    """Of its lane, whose object may be like no other's."""
     qpos: np.ndarray
     seen: np.ndarray | None = None
     """`[H, W, 3]` uint8, by the task's camera."""
@@ -64,12 +66,16 @@ class Painter:
         self._view = _near() if view == "near" else view
         self._scale = scale
         self._camera = Camera(model, scale * HEIGHT, scale * WIDTH)
-        self._model, self._data = model, mujoco.MjData(model)
+        self._task = task
         self._limits = model.jnt_range[task.robot.arm].T
         self._kinematics = InverseKinematics(task.robot, model)
-        self._seen_by = task.camera
 
-    def moment(self, phase: Phase, lane: int, qpos: np.ndarray) -> Moment:
+    def now(self, lane: int) -> Moment:
+        """A lane as it is."""
+        data = self._task.sim.data[lane]
+        return Moment(data.model, data.qpos.copy())
+
+    def moment(self, phase: Phase, lane: int) -> Moment:
         """A lane at the start of a phase of Algorithm 1, without proposals."""
         subgoal = phase.action.decision.subgoal
         toggle = CLOSES if subgoal.gripper_toggle[lane] else OPENS
@@ -77,8 +83,8 @@ class Painter:
             Mark(self.tcp(subgoal.q_toggle[lane]), "disc", toggle),
             Mark(self.tcp(subgoal.q_goal[lane]), "cross", SUBGOAL),
         )
-        seen = phase.observation.images[self._seen_by][lane]
-        return Moment(qpos.copy(), seen, marks)
+        seen = phase.observation.images[self._task.camera][lane]
+        return self.now(lane)._replace(seen=seen, targets=marks)
 
     def proposed(
         self,
@@ -127,9 +133,10 @@ class Painter:
             moment: What is drawn.
             around: Points `[N, 3]` [m]; only the part of the picture about them is shown.
         """
-        self._data.qpos[:] = moment.qpos
-        mujoco.mj_forward(self._model, self._data)
-        picture = Image.fromarray(self._camera.render(self._data, self._view))
+        data = mujoco.MjData(moment.model)
+        data.qpos[:] = moment.qpos
+        mujoco.mj_forward(moment.model, data)
+        picture = Image.fromarray(self._camera.render(data, self._view))
         marks = (*moment.proposals, *moment.targets)
         if marks:
             places = self._camera.project(np.array([m.position for m in marks]))
