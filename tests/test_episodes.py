@@ -108,6 +108,30 @@ def test_toggling_on_the_spot_ends_with_a_reason(mug_task, mug_planner):
         assert [phase["toggled"] for phase in record.phases] == [True] * 3
 
 
+def test_a_subgoal_beside_the_toggle_is_the_toggle(mug_task, mug_planner):
+    """Section 4.2: within 0.1 rad the motion goes to the toggle itself, and toggles there."""
+    mug_task.reset(range(4), range(4))
+    toggle = PANDA.q_home + np.array([0.1, 0.1, 0, 0, 0, 0, 0])
+    off = np.zeros((4, 7))
+    off[:, 3] = 0.0, 0.09, 0.11, -0.09
+
+    def predict(observation, lanes):
+        q_toggle = np.tile(toggle, (4, 1))
+        return Subgoal(q_toggle, 1 - observation.gripper, q_toggle + off), None
+
+    agent = Algorithm1(mug_task, mug_planner, predict)
+    agent.reset(range(4))
+    lanes = list(range(4))
+    action = agent.act(0, lanes, mug_task.observe(lanes))
+    merged = np.array([True, True, False, True])
+    assert action.decision.at_toggle.tolist() == merged.tolist()
+    for lane, way in enumerate(action.q):
+        ends = toggle + (0 if merged[lane] else off[lane])
+        np.testing.assert_allclose(way[-1], ends, atol=1e-3)
+        assert action.gripper[lane][-1] == merged[lane]
+        assert not action.gripper[lane][:-1].any()
+
+
 def test_a_gripper_that_closed_on_nothing_opens_and_backs_off(mug_task, mug_planner):
     """And one that holds the mug does not: what tells them apart is how far the fingers met."""
 

@@ -1,5 +1,9 @@
 """What the scripts in `eval/` share: intervals, seeds, toggle errors."""
 
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -7,7 +11,7 @@ from scipy.stats import binomtest
 
 from jaxplan.episodes import EpisodeRecord
 from jaxplan.evaluation import parse_seeds, versions, wilson
-from jaxplan.evaluation.toggle_error import ToggleError, summarize
+from jaxplan.evaluation.toggle_error import ToggleError, ToggleErrors, summarize
 
 
 def test_wilson_agrees_with_known_values():
@@ -56,6 +60,34 @@ def test_toggle_errors_are_summed_up_per_toggle():
     assert summary["median"] == pytest.approx(0.04)
     assert summary["nearest_toggle_mean"] == pytest.approx(0.025)
     assert summarize([]) == {}
+
+
+def test_the_nearest_toggle_is_any_of_the_episode():
+    """The hand says the second toggle, then the first: each is an episode's, neither the next."""
+    toggles = np.array([[0.0, 0.0], [3.0, 4.0]])
+    task: Any = SimpleNamespace(
+        closed=[False],
+        held=lambda lane: False,
+        in_terminal_region=lambda lane: False,
+        keyframes=lambda lane, q: SimpleNamespace(
+            toggle=int(q[0]), q=toggles[[int(q[0])]]
+        ),
+    )
+    errors = ToggleErrors(task)
+    for phase, said in enumerate((toggles[1] + [0.0, 0.1], toggles[0] + [0.2, 0.0])):
+        subgoal = SimpleNamespace(q_toggle=[said])
+        decision = SimpleNamespace(backing=[], subgoal=subgoal)
+        seen: Any = SimpleNamespace(
+            lanes=[0],
+            action=SimpleNamespace(decision=decision),
+            observation=SimpleNamespace(q=[[phase]]),
+        )
+        errors(seen)
+    first, second = errors.finish()
+    assert first.error == pytest.approx(np.hypot(3.0, 4.1))
+    assert second.error == pytest.approx(np.hypot(2.8, 4.0))
+    assert (first.nearest, second.nearest) == pytest.approx((0.1, 0.2))
+    assert errors.finish() == []
 
 
 def test_an_episode_that_never_moved_is_a_record_too():

@@ -12,6 +12,7 @@ from pathlib import Path
 import jax
 import jax.numpy as jnp
 import numpy as np
+import optax
 import pytest
 from toy_demonstrations import demonstrations
 from toy_training import TOY, toy
@@ -31,7 +32,12 @@ from jaxplan.learning import (
     predictor,
     segments,
 )
-from jaxplan.learning.train_state import ema_decay, init_state, optimizer
+from jaxplan.learning.train_state import (
+    ema_decay,
+    init_state,
+    optimizer,
+    train_step,
+)
 from jaxplan.networks import Prediction
 from jaxplan.pretrained import store
 from jaxplan.trainings import trainings
@@ -92,6 +98,29 @@ def test_ema_decay_numbers():
         assert float(ema_decay(jnp.array(step), config)) == pytest.approx(
             value, abs=1e-3
         )
+
+
+def test_a_step_averages_the_weights_and_draws_anew():
+    """By hand: two steps of plain descent on a noisy line, their average and their noise."""
+    config = OptimizerConfig(ema_power=0.5)
+    tx = optax.sgd(0.1)
+
+    def slope(params, key, batch):
+        noise = jax.random.normal(key)
+        return params * (batch + noise), {"noise": noise}
+
+    state, key = init_state(jnp.array(1.0), tx), jax.random.key(3)
+    value, average = 1.0, 1.0
+    for step in range(3):
+        state, metrics = train_step(slope, tx, config, state, key, jnp.array(2.0))
+        noise = float(jax.random.normal(jax.random.fold_in(key, step)))
+        assert float(metrics["noise"]) == pytest.approx(noise)
+        value -= 0.1 * (2.0 + noise)
+        decay = 1 - (1 + step) ** -0.5
+        average = decay * average + (1 - decay) * value
+        assert float(state.params) == pytest.approx(value, abs=1e-6)
+        assert float(state.ema_params) == pytest.approx(average, abs=1e-6)
+    assert int(state.step) == 3
 
 
 # Segments

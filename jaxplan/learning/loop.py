@@ -1,11 +1,7 @@
 """The training loop: batches, logging, validation, checkpoints, exact resume."""
 
-import dataclasses
-import json
 import logging
-import time
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import lru_cache, partial
 from pathlib import Path
@@ -15,12 +11,10 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
-from filelock import FileLock, Timeout
-from tqdm import tqdm
 
-from jaxplan.data import write_atomic
 from jaxplan.learning import checkpoint
 from jaxplan.learning.data_parallel import Devices
+from jaxplan.learning.run import Metrics, Progress, RunError, claimed
 from jaxplan.learning.train_state import (
     Loss,
     OptimizerConfig,
@@ -58,15 +52,9 @@ class TrainConfig(Checked):
 
 logger = logging.getLogger(__name__)
 
-Metrics = dict[str, float]
-
 
 class TrainingDiverged(ValueError):
     """The loss or a weight is no longer finite."""
-
-
-class RunError(ValueError):
-    """The run's directory belongs to another run, or its settings cannot be met."""
 
 
 def fit(
@@ -109,59 +97,43 @@ def fit(
         raise RunError(
             f"batch_size {config.batch_size} cannot be split among {devices.count} devices"
         )
-    with _claimed(run, config, origin):
+    with claimed(run, config, origin) as store:
         tx = optimizer(config.optimizer, config.steps)
         state = devices.replicate(init_state(params, tx))
-        store = run / "checkpoints"
         if (last := checkpoint.latest(store)) is not None:
             state = checkpoint.restore(store, last, state)
             logger.info("resumed %s at step %d", run, last)
-        first = int(state.step)
-        _forget_after(run / "metrics.jsonl", first)
-
+        first, steps, size = int(state.step), config.steps, config.batch_size
         step_fn = jax.jit(
             partial(train_step, loss, tx, config.optimizer), donate_argnums=0
         )
         key = jax.random.key(config.seed)
         measured: Metrics = {}
-        began = time.perf_counter()
-        bar = tqdm(total=config.steps, initial=first, desc=config.name, unit="step")
-        with bar, (run / "metrics.jsonl").open("a") as log:
-            for step in range(first, config.steps):
-                batch = devices.split(gather(rows_of_step(config, rows, step)))
+
+        def due(done: int, every: int) -> bool:
+            return done % every == 0 or done == steps
+
+        path = run / "metrics.jsonl"
+        with Progress(path, config.name, first, steps, size) as progress:
+            for done in range(first + 1, steps + 1):
+                batch = devices.split(gather(rows_of_step(config, rows, done - 1)))
                 state, metrics = step_fn(state, key, batch)
-                done, last_step = step + 1, step + 1 == config.steps
-                if done % config.log_every == 0 or last_step:
+                if due(done, config.log_every):
                     values = {name: float(value) for name, value in metrics.items()}
                     _check_finite(values["loss"], done)
-                    rate = (
-                        (done - first)
-                        * config.batch_size
-                        / (time.perf_counter() - began)
-                    )
-                    _write(log, {"step": done, **values, "examples_per_second": rate})
-                    bar.update(done - bar.n)
-                    bar.set_postfix_str(
-                        f"loss {values['loss']:.2e}, {rate:.0f} examples/s",
-                        refresh=False,
-                    )
-                if done % config.validate_every == 0 or last_step:
+                    progress.trained(done, values)
+                if due(done, config.validate_every):
                     measured = validate(state.ema_params)
-                    _write(
-                        log,
-                        {"step": done, **{f"val_{k}": v for k, v in measured.items()}},
-                    )
+                    progress.validated(done, measured)
                     logger.info("step %d: %s", done, _line(measured))
                     if export is not None:
                         export(done, state.ema_params, measured)
-                if done % config.checkpoint_every == 0 or last_step:
+                if due(done, config.checkpoint_every):
                     _check_finite(float(metrics["loss"]), done)
                     if not _all_finite(state):
                         raise TrainingDiverged(_diverged("a weight", done))
                     checkpoint.save(store, done, state)
-        if first == config.steps:
-            measured = validate(state.ema_params)
-        return state, measured
+        return state, measured if first < steps else validate(state.ema_params)
 
 
 def rows_of_step(config: TrainConfig, rows: np.ndarray, step: int) -> np.ndarray:
@@ -191,57 +163,6 @@ def held_out(seeds: np.ndarray, fraction: float) -> np.ndarray:
     order = np.argsort([np.random.default_rng([1, int(s)]).random() for s in unique])
     count = min(max(1, round(fraction * len(unique))), max(1, len(unique) - 1))
     return np.isin(seeds, unique[order[:count]])
-
-
-@contextmanager
-def _claimed(
-    run: Path, config: TrainConfig, origin: Mapping[str, Any]
-) -> Iterator[None]:
-    """A run of one's own: nobody else trains there, with these settings of this origin."""
-    run.mkdir(parents=True, exist_ok=True)
-    try:
-        with FileLock(run / ".lock", blocking=False):
-            _claim(run, config, origin)
-            yield
-    except Timeout:
-        raise RunError(
-            f"another process trains in {run}: choose another --name"
-        ) from None
-
-
-def _claim(run: Path, config: TrainConfig, origin: Mapping[str, Any]) -> None:
-    """Writes `config.json`, or checks that it holds the same settings and origin."""
-    wanted = json.loads(json.dumps(dataclasses.asdict(config) | dict(origin)))
-    path = run / "config.json"
-    if path.exists() and checkpoint.latest(run / "checkpoints") is not None:
-        found = json.loads(path.read_text())
-        # Where the weights go does not change what they are.
-        changed = [k for k in wanted if found.get(k) != wanted[k] and k != "out"]
-        if changed:
-            raise RunError(
-                f"{run} was begun with another {', '.join(changed)}: "
-                "choose another --name, or delete it"
-            )
-    write_atomic(path, (json.dumps(wanted, indent=2) + "\n").encode())
-
-
-def _forget_after(path: Path, step: int) -> None:
-    """Drops the lines that the steps after a checkpoint wrote before a kill."""
-    if not path.exists():
-        return
-    kept = []
-    for line in path.read_text().splitlines(keepends=True):
-        try:
-            if json.loads(line)["step"] <= step:
-                kept.append(line)
-        except ValueError:  # half a line
-            break
-    write_atomic(path, "".join(kept).encode())
-
-
-def _write(log: Any, values: dict) -> None:
-    log.write(json.dumps(values) + "\n")
-    log.flush()
 
 
 def _line(metrics: Metrics) -> str:

@@ -10,9 +10,10 @@ import numpy as np
 
 from jaxplan.data import DataError, TimedShard
 from jaxplan.learning.augment import AugmentConfig, photometric
-from jaxplan.learning.loop import Metrics, TrainConfig
+from jaxplan.learning.loop import TrainConfig
 from jaxplan.learning.losses import huber
 from jaxplan.learning.predictor import batches
+from jaxplan.learning.run import Metrics
 from jaxplan.learning.train_state import Loss, Params
 from jaxplan.networks import (
     ERROR_SCALE,

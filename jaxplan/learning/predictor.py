@@ -11,8 +11,9 @@ import numpy as np
 from jaxplan.base import Subgoal
 from jaxplan.data import TOGGLES, Shard
 from jaxplan.learning.augment import AugmentConfig, photometric
-from jaxplan.learning.loop import Metrics, TrainConfig
+from jaxplan.learning.loop import TrainConfig
 from jaxplan.learning.losses import LossConfig, subgoal_loss
+from jaxplan.learning.run import Metrics
 from jaxplan.learning.train_state import Params
 from jaxplan.networks import (
     Predictor,

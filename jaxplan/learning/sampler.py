@@ -10,7 +10,8 @@ import numpy as np
 
 from jaxplan import diffusion
 from jaxplan.data import Shard
-from jaxplan.learning.loop import Metrics, TrainConfig
+from jaxplan.learning.loop import TrainConfig
+from jaxplan.learning.run import Metrics
 from jaxplan.learning.segments import PathRows, path_rows, training_segments
 from jaxplan.learning.train_state import Loss, Params
 from jaxplan.networks import AnyCond, Cond, SegmentConfig
