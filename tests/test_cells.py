@@ -5,6 +5,7 @@ import json
 import pickle
 import subprocess
 import sys
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +26,8 @@ from jaxplan import (
     train,
 )
 from jaxplan.cells import Cell, CellRecorder, RecordConfig, read_problem, record
+from jaxplan.collision import XLA_OPTIONS
+from jaxplan.collision.kinematics import frame_pose
 from jaxplan.learning.weights import Weights, WeightsError
 from jaxplan.networks import SceneCond, SurroundingsConfig
 from jaxplan.networks.surroundings import Surroundings
@@ -120,9 +123,9 @@ def test_each_kind_of_end(planner, goal):
 def test_a_goal_that_is_a_pose_is_reached(planner):
     where = {"body": "hand", "position": [[0.2, 0.2, 0.3], [0.3, 0.3, 0.5]]}
     problem = Cell(planner, {"start": "home", "goal": where}).draw(0, 0)
-    pose = jaxplan.collision.kinematics.frame_pose(
-        planner.scene, problem.world, jnp.asarray(problem.goal), "hand"
-    )
+    hand = partial(frame_pose, planner.scene, body="hand")
+    ask = jax.jit(hand, compiler_options=XLA_OPTIONS)
+    pose = ask(problem.world, jnp.asarray(problem.goal))
     assert (np.asarray(pose)[:, 3] >= np.array([0.2, 0.2, 0.3]) - 0.002).all()
 
 
