@@ -4,6 +4,7 @@ import mujoco
 import numpy as np
 import pytest
 
+from jaxplan import collision
 from jaxplan.collision import World, make_world
 from jaxplan.collision.oracle import Replica
 from jaxplan.collision.touching import random_poses
@@ -16,7 +17,15 @@ ASKED = [*range(3), *(pytest.param(n, marks=pytest.mark.slow) for n in range(3, 
 DRAWN = range(40)
 
 
+@pytest.fixture
+def quick(monkeypatch):
+    """Compiled programs run seldom here."""
+    level = "xla_backend_optimization_level"
+    monkeypatch.setitem(collision.XLA_OPTIONS, level, 0)
+
+
 @pytest.mark.parametrize("seed", ASKED)
+@pytest.mark.usefixtures("quick")
 @pytest.mark.long
 def test_whole_questions_have_right_answers(seed: int):
     scene = random_scene(seed, SMALL).read()

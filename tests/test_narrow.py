@@ -21,6 +21,8 @@ BAND = 1e-4
 MARGIN = 0.01
 ROWS = 128
 VERTICES = 10_000
+# Half the time to compile, and the same sums.
+QUICK = {**XLA_OPTIONS, "xla_backend_optimization_level": 0}
 PAIRS = [
     *CLOSED,
     *(pair for pair in combinations_with_replacement(SOLID, 2) if pair not in CLOSED),
@@ -130,7 +132,7 @@ def rated(kinds: tuple[str, str]):
         free = least(a, b, Score(exact=False, margin=margin)) > 0
         return least(a, b, Score(exact=True)), free
 
-    return jax.jit(rate, compiler_options=XLA_OPTIONS)
+    return jax.jit(rate, compiler_options=QUICK)
 
 
 def cores_apart(kinds, a: Shapes, b: Shapes, distance: np.ndarray) -> np.ndarray:

@@ -21,12 +21,13 @@ from jaxplan.collision import (
 from jaxplan.collision.positions import carry, qpos_rows
 from jaxplan.scene import Scene, geom_pairs
 
+QUICK = {**XLA_OPTIONS, "xla_backend_optimization_level": 0}
 HINGE, SLIDE = mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE
 ROWS = 400
 BAND = 1e-5
-ask = jax.jit(config_free, static_argnums=4, compiler_options=XLA_OPTIONS)
-distance = jax.jit(clearance, static_argnums=3, compiler_options=XLA_OPTIONS)
-most = jax.jit(motion_bound, compiler_options=XLA_OPTIONS)
+ask = jax.jit(config_free, static_argnums=4, compiler_options=QUICK)
+distance = jax.jit(clearance, static_argnums=3, compiler_options=QUICK)
+most = jax.jit(motion_bound, compiler_options=QUICK)
 ALL = ("sphere", "capsule", "ellipsoid", "cylinder", "box", "mesh")
 
 
