@@ -101,7 +101,7 @@ def test_ema_decay_numbers():
 
 
 def test_a_step_averages_the_weights_and_draws_anew():
-    """By hand: two steps of plain descent on a noisy line, their average and their noise."""
+    """By hand: three steps of plain descent on a noisy line, their average and their noise."""
     config = OptimizerConfig(ema_power=0.5)
     tx = optax.sgd(0.1)
 

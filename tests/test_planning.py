@@ -387,16 +387,9 @@ def assert_free(worlds, problem, q0, q1, config):
     assert np.all(np.linalg.norm(q1 - q0, axis=-1) <= config.step_max * 1.001)
 
 
-# Each value with each of every other column once: all eight compile twice as long.
-@pytest.mark.parametrize(
-    ("method", "circular", "workers"),
-    [
-        ("rrt", (), 2),
-        ("rrt", (0, 3, 6), 16),
-        ("rrt_connect", (), 16),
-        ("rrt_connect", (0, 3, 6), 2),
-    ],
-)
+@pytest.mark.parametrize("workers", [2, 16])
+@pytest.mark.parametrize("circular", [(), (0, 3, 6)])
+@pytest.mark.parametrize("method", METHODS)
 def test_results_do_not_depend_on_the_batch(method, circular, workers):
     """A problem has the same answer alone, in company, elsewhere in it, and padded."""
     worlds, q_start, q_goal, keys = problems(12, seed=3)

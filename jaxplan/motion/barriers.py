@@ -32,16 +32,6 @@ class Barrier(NamedTuple):
     """`[M, d]` configurations with the joint at the first of these; none of them is free."""
 
 
-class _Slice(NamedTuple):
-    """A joint at one position, amid others where nothing was free either."""
-
-    joint: int
-    way: int
-    position: float
-    run: int
-    """How many there are of them."""
-
-
 def barrier_between(
     free: Free, q_start: np.ndarray, q_goals: np.ndarray, space: Space, seed: int = 0
 ) -> Barrier | None:
@@ -60,41 +50,28 @@ def barrier_between(
     rng = np.random.default_rng(seed)
     ends = jnp.asarray(q_start), jnp.asarray(q_goals[0])
     low, high = map(np.asarray, space.box(*ends))
-    ways = [
-        (joint, way, span)
-        for joint in range(len(q_start))
-        for way, span in enumerate(_ways(joint, q_start, q_goals, space))
-    ]
-    if not ways:
-        return None
+    joints = range(len(q_start))
+    ways = {j: found for j in joints if (found := _ways(j, q_start, q_goals, space))}
+
+    def shut(joint: int, positions: np.ndarray, count: int) -> tuple[np.ndarray, ...]:
+        """Which positions are free in none of some configurations, and these."""
+        q = rng.uniform(low, high, (len(positions), count, len(low)))
+        q[..., joint] = positions[:, None]
+        free_rows = in_blocks(free, q.reshape(-1, len(low)).astype(np.float32)) > 0
+        return np.asarray(~free_rows.reshape(q.shape[:2]).any(1)), q
+
     inside = np.linspace(0, 1, SLICES + 2)[1:-1]
-    places = np.concatenate([a + inside * (b - a) for *_, (a, b) in ways])
-    joints = np.repeat([joint for joint, *_ in ways], SLICES)
-    q = rng.uniform(low, high, (len(places), FEW, len(low)))
-    q[np.arange(len(places)), :, joints] = places[:, None]
-    any_free = (
-        _free_rows(free, q.reshape(-1, len(low))).reshape(len(places), FEW).any(1)
-    )
-    shut = ~any_free.reshape(len(ways), SLICES)
-    found: dict[int, list[_Slice]] = {}
-    for (joint, way, _), row, at in zip(
-        ways, shut, places.reshape(-1, SLICES), strict=True
-    ):
-        middle, run = _longest(row)
-        if run:
-            found.setdefault(joint, []).append(_Slice(joint, way, at[middle], run))
-    for joint, slices in sorted(found.items(), key=lambda item: -item[1][0].run):
-        if len(slices) < 1 + space.circular[joint]:
-            continue
-        tried = []
-        for one in slices:
-            q = rng.uniform(low, high, (MANY, len(low)))
-            q[:, joint] = one.position
-            if _free_rows(free, q).any():
-                break
-            tried.append(q)
-        else:
-            return Barrier(joint, tuple(one.position for one in slices), tried[0])
+    candidates = []
+    for joint, spans in ways.items():
+        places = [a + inside * (b - a) for a, b in spans]
+        runs = [_longest(shut(joint, at, FEW)[0]) for at in places]
+        if all(length for _, length in runs):
+            middles = [at[middle] for at, (middle, _) in zip(places, runs, strict=True)]
+            candidates.append((runs[0][1], joint, np.array(middles)))
+    for _, joint, middles in sorted(candidates, key=lambda each: -each[0]):
+        everywhere, q = shut(joint, middles, MANY)
+        if everywhere.all():
+            return Barrier(joint, tuple(middles.tolist()), q[0])
     return None
 
 
@@ -119,8 +96,3 @@ def _longest(shut: np.ndarray) -> tuple[int, int]:
         return 0, 0
     first, end = runs[np.argmax(runs[:, 1] - runs[:, 0])]
     return (first + end - 1) // 2, end - first
-
-
-def _free_rows(free: Free, q: np.ndarray) -> np.ndarray:
-    """`[n]` bool of `[n, d]`."""
-    return in_blocks(free, q.astype(np.float32)) > 0

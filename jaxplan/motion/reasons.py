@@ -98,9 +98,9 @@ def _enclosed(asked: Asked) -> str:
 
 def _barred(asked: Asked, space: Space) -> str:
     """Names a joint that hinders every way, if there is one."""
-    found = None
-    if asked.free is not None:
-        found = barrier_between(asked.free, asked.q_start, asked.goals.q, space)
+    if asked.free is None:
+        return ""
+    found = barrier_between(asked.free, asked.q_start, asked.goals.q, space)
     if found is None:
         return ""
     scene, world = asked.scene, asked.plan.world
