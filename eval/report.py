@@ -64,7 +64,9 @@ SECTIONS = (
         "python eval/robustness.py --out eval/results/robustness_plain.json",
         "The hand's camera is turned about its own upright and sideways axes and shifted along all "
         "three, once an episode, or anew for each picture. Light, colours, a distractor and other "
-        "mugs are not in the paper; the shipped weights have seen one mug. "
+        "mugs are not in the paper. Mugs held out are beyond those of training in radius, height, "
+        "handle, mass and colour at once; with recovery a hand that has closed on nothing backs "
+        "off and looks again. "
         "`robustness_without_variation` is of weights that saw one camera only in "
         "training. A toggle error needs phases that end in a toggle: where most episodes fail it "
         "says little.\n\n![One scene under each setting, the expert's toggles as discs, predicted "

@@ -37,6 +37,8 @@ class Setting(NamedTuple):
 
     perturbation: Perturbation = NOMINAL
     objects: str = tasks.ONE
+    regrasp: bool = False
+    """A hand that has closed on nothing looks again."""
 
 
 MILD = Perturbation(yaw=5, pitch=5, translation=0.01)
@@ -62,6 +64,8 @@ SETTINGS = {
     "mugs": Setting(objects="train"),
     "mugs held out": Setting(objects="held_out"),
     "mugs, all together": Setting(ALL, "train"),
+    "mugs, recovery": Setting(objects="train", regrasp=True),
+    "mugs held out, recovery": Setting(objects="held_out", regrasp=True),
 }
 AIMS = {
     "plain": {

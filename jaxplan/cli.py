@@ -23,7 +23,7 @@ class SolveCommand:
     seed: int
     """Of the episode; training never saw seeds from 100000 on."""
     variant: str = "plain"
-    """Of the scene: `plain`, or `cluttered` with obstacles across most straight lines."""
+    """Of the scene: `plain`, `cluttered` with obstacles across most straight lines, or `ways`."""
     out: Path | None = None
     """Directory for episode.json, a video and a film strip."""
     weights: Path | None = None

@@ -15,6 +15,7 @@ from jaxplan.tasks.mug.expert import Expert, Toggle
 from jaxplan.tasks.mug.mug import MugShape, collision_boxes, planning_spheres
 from jaxplan.tasks.mug.poses import RANGE, sample_pose
 from jaxplan.tasks.mug.task import MugTask
+from jaxplan.tasks.mug.variant import BOX
 
 
 @pytest.fixture(scope="module")
@@ -141,7 +142,7 @@ def test_the_judge_names_what_is_wrong(task):
         mujoco.mj_forward(task.model, data)
         return task.failure(0)
 
-    x, y, _ = scene.BOX_POSITION
+    x, y, _ = BOX
     z = scene.BOX_FLOOR + MugShape().height / 2
     assert place([x, y, z]) is None
     assert "outside" in place([x + 0.2, y, z])
@@ -194,7 +195,7 @@ def mug_in_hand(task):
 def test_unknown_names_are_refused():
     for settings, line in (
         (("cup",), "task 'cup': there is mug"),
-        (("mug", 1, "shelf"), "variant 'shelf' of mug: plain or cluttered"),
+        (("mug", 1, "shelf"), "variant 'shelf' of mug: plain or cluttered or ways"),
         (("mug", 1, "plain", "top"), "camera 'top': there is static or hand"),
     ):
         with pytest.raises(ValueError, match=line):

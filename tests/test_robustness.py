@@ -71,7 +71,8 @@ def test_the_paper_s_settings_are_there():
     assert {*PAPER} <= {*SETTINGS}
     assert all({*aims} <= {*SETTINGS} for aims in AIMS.values())
     plain = [name for name in SETTINGS if SETTINGS[name].perturbation.nothing]
-    assert plain == ["nominal", "mugs", "mugs held out"]
+    mugs = "mugs", "mugs held out"
+    assert plain == ["nominal", *mugs, *(f"{name}, recovery" for name in mugs)]
     assert [SETTINGS[name].objects for name in plain] == ["one", "train", "held_out"]
     assert SETTINGS["mild, each query"].perturbation.each_query
 
@@ -80,7 +81,7 @@ def test_the_paper_s_settings_are_there():
     ("arguments", "line"),
     [
         (["--settings", "wild"], "no setting 'wild': there are nominal, mild"),
-        (["--variant", "shelf"], "variant 'shelf' of mug: plain or cluttered"),
+        (["--variant", "shelf"], "variant 'shelf' of mug: plain or cluttered or ways"),
         (["--weights", "nowhere"], "missing weights: no nowhere/manifest.json"),
     ],
 )

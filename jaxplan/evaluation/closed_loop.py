@@ -93,12 +93,18 @@ class ClosedLoop:
         # One phase of one episode compiles all, so that no planning time includes it.
         self._episodes([0], EpisodeConfig(max_phases=1))
 
-    def perturb(self, perturbation: Perturbation, objects: str | None = None) -> None:
+    def perturb(
+        self,
+        perturbation: Perturbation,
+        objects: str | None = None,
+        regrasp: bool | None = None,
+    ) -> None:
         """Lets other things vary from now on; nothing compiles anew.
 
         Args:
             perturbation: In the pictures.
             objects: The episodes'; as before where None.
+            regrasp: Whether a hand that holds nothing looks again; as before where None.
 
         Raises:
             ValueError: One object for all where the loop began with drawn ones, or the
@@ -107,8 +113,14 @@ class ClosedLoop:
         objects = objects or self.config.objects
         self.task.draw(objects)
         self.task.eyes.perturbation = perturbation
+        algorithm = self.config.algorithm
+        if regrasp is not None:
+            algorithm = dataclasses.replace(algorithm, regrasp=regrasp)
         self.config = dataclasses.replace(
-            self.config, perturbation=perturbation, objects=objects
+            self.config,
+            perturbation=perturbation,
+            objects=objects,
+            algorithm=algorithm,
         )
 
     def run(

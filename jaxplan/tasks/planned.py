@@ -1,14 +1,17 @@
 """What planning may know of a batch of episodes, as worlds of one scene."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import jax.numpy as jnp
 import mujoco
 import numpy as np
 
 from jaxplan.collision import World
+from jaxplan.collision.obstacles import Obstacle, fill
 from jaxplan.robots import Robot
 from jaxplan.scene import Scene
+from jaxplan.scene.excludes import ALWAYS
+from jaxplan.scene.source import SLOTS
 from jaxplan.tasks.poses import from_matrix
 
 
@@ -22,17 +25,22 @@ class Planned:
             whether a toggle is near.
         shaped: Objects of which each lane has its own.
         batch: B, how many lanes there are.
+        zones: How many boxes there can be that the hand, and what it holds, keeps out of.
     """
 
     def __init__(
         self,
-        model: mujoco.MjModel,
+        model: mujoco.MjModel | mujoco.MjSpec,
         robot: Robot,
         allowed: Mapping[tuple[str, bool], list[str]],
         shaped: list[str],
         batch: int,
+        zones: int = 0,
     ) -> None:
-        self.scene = Scene.from_mjcf(model, shaped=shaped)
+        self.scene = _scene(model, robot, shaped, zones)
+        none = tuple(np.asarray(leaf) for leaf in fill(self.scene, []))
+        self._zones = [none] * batch
+        """Poses and sizes of the lanes' zones."""
         self._robot = robot
         self._allowed = {key: self.scene.ignored(allowed[key]) for key in allowed}
         rows, numbers = list(self.scene.shaped), self.scene.model
@@ -47,6 +55,11 @@ class Planned:
         names = map(self.scene.geom_name, self.scene.shaped)
         pos, size = zip(*(geoms[name] for name in names), strict=True)
         self._geoms[lane] = np.array(pos, np.float32), np.array(size, np.float32)
+
+    def begin(self, lane: int, zones: Sequence[Obstacle]) -> None:
+        """A lane's episode has these zones."""
+        pose, size = fill(self.scene, zones)
+        self._zones[lane] = np.asarray(pose), np.asarray(size)
 
     def leaves(
         self, lane: int, pose: np.ndarray, held: bool, touching: bool, qpos: np.ndarray
@@ -66,10 +79,25 @@ class Planned:
             np.array([held]),
             fingers.clip(0, self._robot.gripper.open).astype(np.float32),
             self._allowed["held" if held else "free", touching],
-            np.zeros((0, 7), np.float32),
-            np.zeros((0, 3), np.float32),
+            *self._zones[lane],
             *self._geoms[lane],
         )
+
+
+def _scene(
+    model: mujoco.MjModel | mujoco.MjSpec, robot: Robot, shaped: list[str], zones: int
+) -> Scene:
+    """Where links before the hand may be in zones."""
+    if not zones:
+        return Scene.from_mjcf(model, shaped=shaped)
+    assert isinstance(model, mujoco.MjSpec), "zones need a model that is not compiled"
+    links, body = [], model.body(robot.hand).parent
+    while body.name != "world":
+        links.append((body.name, SLOTS))
+        body = body.parent
+    return Scene.from_mjcf(
+        model, slots={"box": zones}, exclude=[ALWAYS, *links], shaped=shaped
+    )
 
 
 def stacked(rows: list[tuple[np.ndarray, ...]]) -> World:

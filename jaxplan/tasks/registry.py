@@ -1,13 +1,13 @@
 """The tasks by name: `load("mug", batch=32, variant="cluttered")`."""
 
 from collections.abc import Callable, Mapping
-from typing import NamedTuple, get_args
+from typing import NamedTuple
 
 from jaxplan import ranges
 from jaxplan.robots import PANDA
 from jaxplan.tasks.mug.mugs import RANGES, described
 from jaxplan.tasks.mug.poses import STARTS
-from jaxplan.tasks.mug.scene import Variant
+from jaxplan.tasks.mug.scene import VARIANTS
 from jaxplan.tasks.mug.task import MugTask
 from jaxplan.tasks.perturbation import NOMINAL, Perturbation
 from jaxplan.tasks.starts import Starts
@@ -32,7 +32,7 @@ class TaskEntry(NamedTuple):
 TASKS = {
     "mug": TaskEntry(
         MugTask,
-        get_args(Variant),
+        tuple(VARIANTS),
         PANDA.name,
         STARTS,
         {ONE: {}} | {name: described(name) for name in RANGES},

@@ -13,6 +13,7 @@ import numpy as np
 
 from jaxplan.base import Action, Keyframes, Observation
 from jaxplan.collision import World
+from jaxplan.collision.obstacles import Obstacle
 from jaxplan.config import PAPER_PLANNER
 from jaxplan.motion import MotionPlanner
 from jaxplan.robots import Robot
@@ -54,6 +55,7 @@ class Tabletop(ABC):
         look: Makes what perturbed ones are taken of, with the model's joints; the model itself
             where None.
         objects: Which objects episodes have: `ONE` for all, or each lane is given its own.
+        zones: How many boxes an episode can have that the hand, and what it holds, keeps out of.
 
     Raises:
         ValueError: There is no such camera.
@@ -64,7 +66,7 @@ class Tabletop(ABC):
         name: str,
         robot: Robot,
         model: mujoco.MjModel,
-        planning: mujoco.MjModel,
+        planning: mujoco.MjModel | mujoco.MjSpec,
         allowed: Mapping[tuple[str, bool], list[str]],
         movable: str,
         batch: int,
@@ -73,6 +75,7 @@ class Tabletop(ABC):
         perturbation: Perturbation = NOMINAL,
         look: Callable[[], mujoco.MjModel] | None = None,
         objects: str = ONE,
+        zones: int = 0,
     ) -> None:
         self.name, self.robot, self.model, self.batch = name, robot, model, batch
         self.camera = camera
@@ -80,7 +83,7 @@ class Tabletop(ABC):
         self._arms = Execution(self.sim, self.tcp, batch)
         self.closed = self._arms.closed
         shaped = [] if objects == ONE else [movable]
-        self._planned = Planned(planning, robot, allowed, shaped, batch)
+        self._planned = Planned(planning, robot, allowed, shaped, batch, zones)
         self.planning_scene, self.objects = self._planned.scene, objects
         self.kinematics = InverseKinematics(robot, model)
         look = look or (lambda: model)
@@ -109,6 +112,11 @@ class Tabletop(ABC):
         """The planner of demonstrations, and of recorded problems."""
         config = replace(PAPER_PLANNER, p_uniform=1.0)
         return MotionPlanner(self.planning_scene, self.robot.limits, config)
+
+    @property
+    def zones(self) -> Mapping[str, Obstacle]:
+        """Ways that an episode may close, by name, and the zone that closes each."""
+        return {}
 
     def watch(self) -> Watch:
         """Who tells failures by kind."""
@@ -156,9 +164,12 @@ class Tabletop(ABC):
         self.eyes.give(lane, look)
         self._planned.give(lane, geoms)
 
-    def begin(self, lane: int, seed: int, pose: np.ndarray) -> None:
-        """Arm at home, gripper open, the object at a pose `[4, 4]`."""
+    def begin(
+        self, lane: int, seed: int, pose: np.ndarray, zones: Sequence[Obstacle] = ()
+    ) -> None:
+        """Arm at home, gripper open, the object at a pose `[4, 4]`, and zones to keep out of."""
         self.eyes.begin(lane, seed)
+        self._planned.begin(lane, zones)
         data = self.sim.data[lane]
         mujoco.mj_resetDataKeyframe(data.model, data, 0)
         data.qpos[self.object_slice] = from_matrix(pose)

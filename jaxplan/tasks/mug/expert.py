@@ -15,7 +15,8 @@ from jaxplan.base import Keyframes
 from jaxplan.robots import PANDA
 from jaxplan.robots.kinematics import InverseKinematics
 from jaxplan.tasks.mug.mug import MugShape
-from jaxplan.tasks.mug.scene import BOX_FLOOR, BOX_POSITION
+from jaxplan.tasks.mug.scene import BOX_FLOOR
+from jaxplan.tasks.mug.variant import BOX
 from jaxplan.tasks.tabletop import RETREAT
 
 UP = np.array([0.0, 0.0, 1.0])
@@ -56,12 +57,16 @@ class Expert:
     Args:
         kinematics: Of the arm.
         shape: Of the mug.
+        box: Where the box stands [m].
     """
 
     def __init__(
-        self, kinematics: InverseKinematics, shape: MugShape = MugShape()
+        self,
+        kinematics: InverseKinematics,
+        shape: MugShape = MugShape(),
+        box: ArrayLike = BOX,
     ) -> None:
-        self._ik, self._shape = kinematics, shape
+        self._ik, self._shape, self._box = kinematics, shape, box
 
     def next_toggle(self, mug: np.ndarray, q: np.ndarray, closed: bool) -> Toggle:
         """Which event comes next, for a mug pose `[4, 4]`, joints [rad] and gripper."""
@@ -143,7 +148,7 @@ class Expert:
 
     def _put_in_box(self, mug: np.ndarray, q: np.ndarray) -> Approach:
         place = _moved(
-            _pose(BOX_POSITION, _yaw(BOX_YAWS[int(mug[1, 0] > 0)])),
+            _pose(self._box, _yaw(BOX_YAWS[int(mug[1, 0] > 0)])),
             [0, 0, BOX_FLOOR + self._shape.height / 2 + DROP],
         )
         # A handle that would lie on the box's wall: the mug stands beside the middle.

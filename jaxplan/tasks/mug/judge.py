@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from jaxplan.tasks.mug.scene import BOX_INNER, BOX_POSITION
+from jaxplan.tasks.mug.scene import BOX_INNER
 
 MAX_TILT = np.radians(20)
 MAX_SPEED = 0.01
@@ -11,14 +11,19 @@ HAND_CLEAR = 0.05
 """Least distance of the tool centre point from the mug's centre [m]."""
 
 
-def in_terminal_region(tcp: np.ndarray, closed: bool) -> bool:
-    """Q_term: gripper open, tool centre point `[3]` low over the target box [m]."""
-    over_box = np.all(np.abs(tcp[:2] - BOX_POSITION[:2]) < BOX_INNER + 0.02)
+def in_terminal_region(tcp: np.ndarray, closed: bool, box: np.ndarray) -> bool:
+    """Q_term: gripper open, tool centre point `[3]` low over the target box at `box [3]` [m]."""
+    over_box = np.all(np.abs(tcp[:2] - box[:2]) < BOX_INNER + 0.02)
     return bool(not closed and over_box and tcp[2] < 0.12)
 
 
 def failure(
-    mug: np.ndarray, speed: float, tcp: np.ndarray, closed: bool, touching: bool
+    mug: np.ndarray,
+    speed: float,
+    tcp: np.ndarray,
+    closed: bool,
+    touching: bool,
+    box: np.ndarray,
 ) -> str | None:
     """Why an episode that is over is no success; None if the mug stands in the box.
 
@@ -28,8 +33,9 @@ def failure(
         tcp: The tool centre point, `[3]` [m].
         closed: Whether the gripper is closed.
         touching: Whether a pad touches the mug.
+        box: Where the box stands, `[3]` [m].
     """
-    off_centre = np.abs((mug[:3, 3] - BOX_POSITION)[:2])
+    off_centre = np.abs((mug[:3, 3] - box)[:2])
     checks = {
         "the mug is outside the box": np.any(off_centre > BOX_INNER),
         "the mug is not upright": mug[2, 2] < np.cos(MAX_TILT),

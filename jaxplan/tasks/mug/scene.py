@@ -1,7 +1,7 @@
 """The mug scene: Panda, table, mug, target box, cameras; a model for physics, one for planning."""
 
 from functools import cache
-from typing import Literal, get_args
+from typing import Literal
 
 import mujoco
 import numpy as np
@@ -9,19 +9,19 @@ from numpy.typing import ArrayLike
 
 from jaxplan.robots import PANDA
 from jaxplan.tasks.look import AWAY, DISTRACTOR, TEXTURED
-from jaxplan.tasks.mug.clutter import add_clutter
+from jaxplan.tasks.mug.clutter import CLUTTERED
 from jaxplan.tasks.mug.mug import STIFF_CONTACT, MugShape, add_mug
+from jaxplan.tasks.mug.variant import Variant, add_obstacles
+from jaxplan.tasks.mug.ways import WAYS
 
-BOX_POSITION = np.array([0.45, -0.36, 0.0])
-"""Of the target box, on the table [m]."""
 BOX_INNER, BOX_WALL, BOX_HEIGHT, BOX_FLOOR = 0.085, 0.005, 0.04, 0.004
-"""Half of the inner side, half of the wall's thickness, height and floor thickness [m]."""
+"""Of the target box: half of the inner side, half of the wall's thickness, height and floor
+thickness [m]."""
 
 IMAGE_HEIGHT, IMAGE_WIDTH = PANDA.mount.height, PANDA.mount.width
 
 Kind = Literal["physics", "planning"]
-Variant = Literal["plain", "cluttered"]
-"""`cluttered` has obstacles across most straight lines (`clutter`)."""
+VARIANTS = {"plain": Variant(), "cluttered": CLUTTERED, "ways": WAYS}
 
 PHYSICS = {"group": 3, "contype": 1, "conaffinity": 3}
 PLANNING = {"group": 4, "contype": 4, "conaffinity": 12}
@@ -32,7 +32,7 @@ VISUAL = {"group": 2, "contype": 0, "conaffinity": 0}
 def build(
     kind: Kind = "physics",
     shape: MugShape = MugShape(),
-    variant: Variant = "plain",
+    variant: str = "plain",
 ) -> mujoco.MjModel:
     """Compiles the scene; `kind` says whose geoms collide.
 
@@ -42,7 +42,7 @@ def build(
     return spec(kind, shape, variant).compile()
 
 
-def look(shape: MugShape = MugShape(), variant: Variant = "plain") -> mujoco.MjModel:
+def look(shape: MugShape = MugShape(), variant: str = "plain") -> mujoco.MjModel:
     """How the scene of physics looks, with a textured table and a distractor for who asks for them.
 
     Joints are those of physics.
@@ -75,15 +75,15 @@ def look(shape: MugShape = MugShape(), variant: Variant = "plain") -> mujoco.MjM
 def spec(
     kind: Kind = "physics",
     shape: MugShape = MugShape(),
-    variant: Variant = "plain",
+    variant: str = "plain",
 ) -> mujoco.MjSpec:
     """The scene before compilation.
 
     Raises:
         ValueError: There is no such variant.
     """
-    if variant not in get_args(Variant):
-        raise ValueError(f"variant {variant!r}: plain or cluttered")
+    if variant not in VARIANTS:
+        raise ValueError(f"variant {variant!r}: {' or '.join(VARIANTS)}")
     scene = _surroundings(kind, variant).copy()
     scene.material("mug").rgba = [*shape.colour, 1]
     add_mug(scene, shape)
@@ -101,8 +101,9 @@ def spec(
 
 
 @cache
-def _surroundings(kind: Kind, variant: Variant) -> mujoco.MjSpec:
+def _surroundings(kind: Kind, variant: str) -> mujoco.MjSpec:
     """All but the mug, made once: it takes several times as long as a mug."""
+    layout = VARIANTS[variant]
     scene = PANDA.spec()
     scene.modelname = f"mug_{kind}"
     option = scene.option
@@ -113,9 +114,10 @@ def _surroundings(kind: Kind, variant: Variant) -> mujoco.MjSpec:
     option.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
     _add_look(scene)
     _add_table(scene)
-    _add_box(scene)
-    if variant == "cluttered":
-        add_clutter(scene, PHYSICS | STIFF_CONTACT, PLANNING, VISUAL)
+    _add_box(scene, layout.box)
+    if layout.obstacles:
+        looks = PHYSICS | STIFF_CONTACT, PLANNING, VISUAL
+        add_obstacles(scene, layout.obstacles, *looks)
     for geom in list(scene.geoms):
         if geom.group == (4 if kind == "physics" else 3):
             scene.delete(geom)
@@ -164,8 +166,8 @@ def _add_table(scene: mujoco.MjSpec) -> None:
     )
 
 
-def _add_box(scene: mujoco.MjSpec) -> None:
-    body = scene.worldbody.add_body(name="box", pos=BOX_POSITION)
+def _add_box(scene: mujoco.MjSpec, position: ArrayLike) -> None:
+    body = scene.worldbody.add_body(name="box", pos=position)
     outer, middle = BOX_INNER + 2 * BOX_WALL, BOX_INNER + BOX_WALL
     z, h = BOX_FLOOR + BOX_HEIGHT / 2, BOX_HEIGHT / 2
     parts = {

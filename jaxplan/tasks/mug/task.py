@@ -7,13 +7,15 @@ import mujoco
 import numpy as np
 
 from jaxplan.base import Keyframes
+from jaxplan.collision.obstacles import Obstacle
 from jaxplan.motion import MotionPlanner
 from jaxplan.robots import PANDA
 from jaxplan.tasks.mug import judge, mugs, poses, scene
+from jaxplan.tasks.mug.demonstrated import expert_planner
 from jaxplan.tasks.mug.expert import Expert
 from jaxplan.tasks.mug.mug import MugShape, planning_geoms
 from jaxplan.tasks.mug.watch import MugWatch
-from jaxplan.tasks.mug.way import expert_planner
+from jaxplan.tasks.mug.ways import closed_way
 from jaxplan.tasks.perturbation import NOMINAL, Perturbation
 from jaxplan.tasks.tabletop import ONE, Tabletop, full_name
 
@@ -28,7 +30,7 @@ class MugTask(Tabletop):
         batch: Number of episodes side by side.
         camera: `hand` or `static`.
         friction: Factor on all friction; 0 shows that grasps hold by friction alone.
-        variant: `plain`, or `cluttered` with obstacles across most straight lines.
+        variant: One of `scene.VARIANTS`.
         perturbation: What varies in the pictures.
         objects: Which mugs there are: the same one, or those of `mugs.RANGES`.
 
@@ -41,17 +43,18 @@ class MugTask(Tabletop):
         batch: int,
         camera: str = "hand",
         friction: float = 1.0,
-        variant: scene.Variant = "plain",
+        variant: str = "plain",
         perturbation: Perturbation = NOMINAL,
         objects: str = ONE,
     ) -> None:
-        self.variant: scene.Variant = variant
-        self._friction = friction
+        self.variant, self._friction = variant, friction
+        self._layout = scene.VARIANTS[variant]
+        self._box = np.array(self._layout.box)
         super().__init__(
             full_name("mug", variant),
             PANDA,
             self._physics(MugShape()),
-            scene.build("planning", variant=variant),
+            scene.spec("planning", variant=variant),
             allowed_contacts(),
             "mug",
             batch,
@@ -60,13 +63,19 @@ class MugTask(Tabletop):
             perturbation,
             partial(scene.look, variant=variant),
             objects,
+            zones=1 if self._layout.zones else 0,
         )
         self.shapes = [MugShape()] * batch
         """The lanes' mugs. Privileged."""
 
     def expert_planner(self) -> MotionPlanner:
         """The planner of demonstrations, and of recorded problems."""
-        return expert_planner(self.planning_scene, self.variant)
+        return expert_planner(self.planning_scene, self._layout)
+
+    @property
+    def zones(self) -> dict[str, Obstacle]:
+        """Of the variant."""
+        return {name: zone.obstacle for name, zone in self._layout.zones.items()}
 
     def watch(self) -> MugWatch:
         """Who tells failures by kind."""
@@ -82,7 +91,7 @@ class MugTask(Tabletop):
                 self._take(lane, mugs.mug_of(self.objects, seed))
             pose = np.eye(4)
             pose[:3, 3], pose[:3, :3] = poses.sample_pose(seed, self.shapes[lane])
-            self.begin(lane, seed, pose)
+            self.begin(lane, seed, pose, self._zones(seed))
         self.wait(lanes, SETTLE)
 
     def unfit(self, lane: int) -> str | None:
@@ -93,13 +102,13 @@ class MugTask(Tabletop):
 
     def keyframes(self, lane: int, q: np.ndarray) -> Keyframes:
         """The expert's way to the next toggle. Privileged."""
-        expert = Expert(self.kinematics, self.shapes[lane])
+        expert = Expert(self.kinematics, self.shapes[lane], self._box)
         closed = bool(self.closed[lane])
         return expert.keyframes(self.object_pose(lane), q.astype(float), closed)
 
     def in_terminal_region(self, lane: int) -> bool:
         """Q_term: the open hand is low over the target box. Known from the joints alone."""
-        return judge.in_terminal_region(self.tcp(lane), self.closed[lane])
+        return judge.in_terminal_region(self.tcp(lane), self.closed[lane], self._box)
 
     def failure(self, lane: int) -> str | None:
         """Why the finished episode is no success.
@@ -112,7 +121,13 @@ class MugTask(Tabletop):
             self.tcp(lane),
             self.closed[lane],
             self.pads_touching(lane) > 0,
+            self._box,
         )
+
+    def _zones(self, seed: int) -> list[Obstacle]:
+        """The zone that closes an episode's way, if one does."""
+        closed = closed_way(seed, self.zones)
+        return [] if closed is None else [self.zones[closed]]
 
     def _take(self, lane: int, shape: MugShape) -> None:
         """Another mug for a lane."""
