@@ -73,7 +73,9 @@ def test_the_paper_s_settings_are_there():
     plain = [name for name in SETTINGS if SETTINGS[name].perturbation.nothing]
     mugs = "mugs", "mugs held out"
     assert plain == ["nominal", *mugs, *(f"{name}, recovery" for name in mugs)]
-    assert [SETTINGS[name].objects for name in plain] == ["one", "train", "held_out"]
+    drawn = ["train", "held_out"]
+    assert [SETTINGS[name].objects for name in plain] == ["one", *drawn, *drawn]
+    assert [SETTINGS[name].regrasp for name in plain] == [False] * 3 + [True] * 2
     assert SETTINGS["mild, each query"].perturbation.each_query
 
 
