@@ -11,6 +11,7 @@ not told.
 """
 
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -66,11 +67,17 @@ def main(args: Args) -> None:
     rows, ways = by_each_way(study, rows)
     problems = study.problems.take(rows)
     open_ = np.abs(problems.slot_pose[:, :, :3]).max(axis=(1, 2)) > 100
+    points = points_for(PAPER_PLANNER.step_max, PAPER_PLANNER.edge_resolution)
+    free = jit(
+        lambda worlds, q0, q1: collision.motion_free(
+            study.scene, worlds, q0, q1, points, PAPER_PLANNER.margin
+        )
+    )
     asked: dict[str, Proposed] = {}
     for name in tqdm(FAMILIES, desc="samplers"):
         if weights := study.weights(name):
             banks = KeptBanks(Bank(weights), study.cond, study.problems.keys())
-            asked[name] = propose(study, problems, banks, rows, ways, args.banks)
+            asked[name] = propose(study, free, problems, banks, rows, ways, args.banks)
     tables = [
         table(f"{words} ({int(some.sum())})", asked, some)
         for words, some in (("nothing closed", open_), ("a way closed", ~open_))
@@ -117,6 +124,7 @@ def by_each_way(
 
 def propose(
     study: RecordedStudy,
+    free: Callable,
     problems: RecordedProblems,
     banks: KeptBanks,
     rows: np.ndarray,
@@ -130,18 +138,12 @@ def propose(
     ends = np.concatenate([np.asarray(part.end) for part in drawn], axis=1)
     limits = study.task.robot.limits
     ends = np.clip(ends, limits.q_min, limits.q_max).astype(np.float32)
-    points = points_for(PAPER_PLANNER.step_max, PAPER_PLANNER.edge_resolution)
-    check = jit(
-        lambda worlds, q0, q1: collision.motion_free(
-            study.scene, worlds, q0, q1, points, PAPER_PLANNER.margin
-        )
-    )
     worlds = jax.tree.map(jnp.asarray, problems.worlds)
-    free = [
-        np.asarray(check(worlds, base[:, i], ends[:, i])) for i in range(base.shape[1])
+    shares = [
+        np.asarray(free(worlds, base[:, i], ends[:, i])) for i in range(base.shape[1])
     ]
     found = [coverage(each, paths) for each, paths in zip(ends, ways, strict=True)]
-    return Proposed(np.mean(free, axis=0), found)
+    return Proposed(np.mean(shares, axis=0), found)
 
 
 def table(title: str, asked: dict[str, Proposed], some: np.ndarray) -> Table:

@@ -28,10 +28,9 @@ def test_shares_are_counted_by_way(left):
 
 def test_where_ways_are_one_a_proposal_belongs_to_none():
     assert coverage(cloud([0, 0], 50), [LEFT, RIGHT]).shares.sum() == 0
-    assert (
-        coverage(cloud([0, 2], 50), [LEFT, RIGHT]).shares.sum() == 0
-    )  # the mean of two
-    assert coverage(cloud([0, 2], 50), [LEFT, RIGHT]).distance > 0.9
+    mean_of_two = coverage(cloud([0, 2], 50), [LEFT, RIGHT])
+    assert mean_of_two.shares.sum() == 0
+    assert mean_of_two.distance > 0.9
 
 
 def test_one_way_has_all():
