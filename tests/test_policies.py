@@ -1,6 +1,8 @@
 """Policies: windows, chunks, the interface that executes them, and the registry."""
 
+import runpy
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import flax.linen as nn
@@ -15,6 +17,7 @@ from toy_timed import JOINTS, timed
 from jaxplan import data, policies, train
 from jaxplan.base import Observation
 from jaxplan.learning import WeightsError, loop
+from jaxplan.learning.augment import AugmentConfig
 from jaxplan.learning.policy import (
     PolicyTraining,
     Windows,
@@ -22,10 +25,18 @@ from jaxplan.learning.policy import (
     fitted,
     weighted,
 )
-from jaxplan.networks import Chunk, PolicyConfig, decode, encode
+from jaxplan.learning.predictor import encodings
+from jaxplan.networks import (
+    Chunk,
+    HandCameraConfig,
+    PolicyConfig,
+    Predictor,
+    decode,
+    encode,
+)
 from jaxplan.networks.mixture import Mixture
 from jaxplan.policies import POLICIES, Drive, Policy, PolicyAgent, Step
-from jaxplan.pretrained import load_weights
+from jaxplan.pretrained import load_weights, save_weights
 from jaxplan.robots import PANDA
 from jaxplan.trainings import files
 
@@ -286,3 +297,64 @@ def test_what_a_lane_does_depends_on_it_alone(kind, trained):
     np.testing.assert_array_equal(straight[0], swapped[1])
     np.testing.assert_array_equal(straight[1], swapped[0])
     assert agent.network._cache_size() == 1
+
+
+# Beginning with what the predictor sees
+
+
+@pytest.fixture(scope="module")
+def upper(tmp_path_factory):
+    """A directory of a predictor of the debug recipe's sizes, untrained."""
+    directory = tmp_path_factory.mktemp("upper")
+    config = runpy.run_path(str(CONFIGS / "debug.py"))["predictor"].network
+    frame = {"image": np.zeros((1, *data.IMAGE_SHAPE), np.uint8), "q": np.zeros((1, 7))}
+    params = Predictor(config).init(jax.random.key(5), **frame, gripper=np.zeros(1))
+    save_weights(directory, "predictor", params, config, {})
+    return directory
+
+
+@pytest.mark.parametrize("kind", ["diffusion_policy", "lstm_gmm", "transformer"])
+def test_a_picture_and_what_the_encoder_says_of_it_teach_the_same(kind):
+    policy, shard = POLICIES[kind], timed(episodes=2, frames=6)
+    training = runpy.run_path(str(CONFIGS / "debug.py"))[kind]
+    network = replace(training.network, camera=HandCameraConfig(), calibrates=True)
+    network = fitted(network, shard)
+    training = replace(training, network=network, augment=AugmentConfig(0, 0, 0))
+    params = policies.init(network, jax.random.key(1))
+    own = {"params": {"encoder": params["params"]["window"]["encoder"]}}
+    said = encodings(network, own, shard.image)
+    key, rows = jax.random.key(2), np.arange(12)
+    values = [
+        jax.jit(partial(policy.loss, training))(
+            params, key, Windows(seen, network)(rows)
+        )
+        for seen in (shard, shard._replace(image=said))
+    ]
+    jax.tree.map(partial(np.testing.assert_allclose, rtol=1e-4), *values)
+
+
+def test_encoding_once_leaves_the_encoder_as_it_is(
+    upper, timed_demos, tmp_path, monkeypatch, capsys
+):
+    monkeypatch.setattr(files, "RUNS", tmp_path / "runs")
+    kind, once = "lstm_gmm", ["--encode-once"]
+    start = [*command("lstm_gmm", timed_demos), "--sight", str(upper)]
+    assert train.main([*start, *once, "--out", str(tmp_path / "once")]) == 0
+    theirs = load_weights("predictor", upper).params["params"]
+    head = load_weights(kind, tmp_path / "once")
+    window = head.params["params"]["window"]
+    jax.tree.map(np.testing.assert_array_equal, window["encoder"], theirs["encoder"])
+    assert not np.array_equal(window["Dense_0"]["kernel"], theirs["Dense_0"]["kernel"])
+    assert set(head.info) >= {"sight_sha256"}
+    # And on from there, the encoder with it.
+    on = [*command(kind, timed_demos), "--name", "on", "--init", str(tmp_path / "once")]
+    assert train.main([*on, "--out", str(tmp_path / "whole")]) == 0
+    whole = load_weights(kind, tmp_path / "whole").params["params"]["window"]
+    kernels = [w["encoder"]["keypoints"]["kernel"] for w in (window, whole)]
+    assert not np.array_equal(*kernels)
+    other = ["--network.state-features", "9", "--name", "other"]
+    assert train.main([*start, *other]) == 2
+    assert "other --network settings: Dense_0" in capsys.readouterr().err
+    for wrong in ({}, {"sight": str(upper), "init": str(upper)}):
+        with pytest.raises(ValueError, match="encode_once: the encoder is that of"):
+            LineTraining(encode_once=True, **wrong)

@@ -13,7 +13,7 @@ from jaxplan.networks import Cond, SegmentConfig
 from jaxplan.pretrained import DIRECTORY, load_weights
 from jaxplan.samplers import Bank, Family
 from jaxplan.samplers.segments import noise, segments
-from jaxplan.trainings import files, sampler
+from jaxplan.trainings import files
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,9 @@ FAMILY = Family("line", LineConfig, LineTraining, Line, fresh, draw, loss)
 def test_it_is_trained_saved_and_drawn_from(monkeypatch, demos, tmp_path):
     monkeypatch.setitem(samplers.FAMILIES, "line", FAMILY)
     monkeypatch.setattr(files, "RUNS", tmp_path)
-    monkeypatch.setattr(sampler, "features", lambda upper, shard, _: shard.q)
+    monkeypatch.setattr(
+        files, "encoded", lambda upper, image, _: (image[:, 0, 0] / 255, None)
+    )
     out = ["--data", demos, "--steps", "20", "--out", str(tmp_path / "w")]
     assert train.main(["line", "--predictor", str(DIRECTORY), *out]) == 0
     weights = load_weights("line", tmp_path / "w")

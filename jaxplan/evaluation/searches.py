@@ -14,7 +14,7 @@ import numpy as np
 from jaxplan.config import PlannerConfig
 from jaxplan.evaluation.problems import RecordedProblems
 from jaxplan.learning import Weights
-from jaxplan.learning.predictor import image_features
+from jaxplan.learning.predictor import encodings
 from jaxplan.motion.search import sampled_search
 from jaxplan.networks import Cond
 from jaxplan.planning import DrawBank, Segment, Status
@@ -45,7 +45,7 @@ class Answers(NamedTuple):
 
 def conditions(problems: RecordedProblems, predictor: Weights) -> Cond:
     """What the samplers are told of each problem; features are the predictor's, frozen."""
-    features = image_features(predictor.config, predictor.params, problems.image)
+    features, _ = encodings(predictor.config, predictor.params, problems.image)
     columns: dict[str, Any] = {
         "image": features,
         "q": problems.q,

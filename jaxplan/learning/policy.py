@@ -18,6 +18,7 @@ from jaxplan.learning.train_state import Loss, Params
 from jaxplan.networks import (
     ERROR_SCALE,
     Chunk,
+    Encoding,
     PolicyConfig,
     Window,
     decode,
@@ -32,6 +33,12 @@ class PolicyTraining(TrainConfig):
     """What the trainings of all policies have in common."""
 
     network: PolicyConfig
+    sight: str | None = None
+    """Directory of a predictor whose sight training begins with: encoder, calibration; None = a
+    fresh one."""
+    encode_once: bool = False
+    """That encoder stays as it is, and every picture is encoded once, as it is: all the rest is
+    trained many times as fast. Then go on from there (`init`) without."""
     augment: AugmentConfig = AugmentConfig()
     near_toggle: Whole = 8
     """Frames so near to a toggle, before and after it, ..."""
@@ -41,6 +48,18 @@ class PolicyTraining(TrainConfig):
     """Of the camera's error in the loss, where the network says it."""
     val_windows: Count = 1024
     """Of the held-out ones, for validation."""
+
+    def __post_init__(self) -> None:
+        """Checks the fields, and that there is an encoder to encode by.
+
+        Raises:
+            ValueError: A field makes no sense.
+        """
+        super().__post_init__()
+        if self.encode_once and (self.sight is None or self.init is not None):
+            raise ValueError(
+                "encode_once: the encoder is that of `sight`, and there is no `init`"
+            )
 
 
 Act = Callable[[Any, Params, Window, jax.Array], jax.Array]
@@ -93,7 +112,7 @@ class Windows:
 def _take(columns: list[Any], seen: Any, done: Any) -> Batch:
     image, q, gripper, action_q, action_gripper, error = columns
     return Batch(
-        Window(image[seen], q[seen], gripper[seen]),
+        Window(jax.tree.map(lambda x: x[seen], image), q[seen], gripper[seen]),
         Chunk(action_q[done], action_gripper[done]),
         error[seen],
     )
@@ -134,9 +153,11 @@ def examples(
 ) -> tuple[Window, jax.Array]:
     """Windows with augmented pictures, and the coded chunks [B, H, T, d + 1] to say."""
     window = batch.window
+    x_0 = encode(config.network, window.q, batch.chunk)
+    if isinstance(window.image, Encoding):
+        return window, x_0
     pixels = window.image.reshape(-1, *window.image.shape[-3:])
     image = photometric(key, pixels, config.augment).reshape(window.image.shape)
-    x_0 = encode(config.network, window.q, batch.chunk)
     return window._replace(image=image), x_0
 
 

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 
 from jaxplan.base import Subgoal
@@ -16,11 +15,12 @@ from jaxplan.learning.losses import LossConfig, subgoal_loss
 from jaxplan.learning.run import Metrics
 from jaxplan.learning.train_state import Params
 from jaxplan.networks import (
+    Encoder,
+    Encoding,
     Predictor,
     PredictorConfig,
     as_subgoal,
     normalize,
-    predict,
 )
 
 
@@ -146,17 +146,11 @@ def batches(rows: np.ndarray, size: int) -> list[np.ndarray]:
     return list(filled.reshape(-1, size))
 
 
-def image_features(
-    config: PredictorConfig, params: Params, image: np.ndarray
-) -> np.ndarray:
-    """The encoder's features of all images [N, 88, 136, 3], f32 [N, F]."""
-    zeros = jnp.zeros((1, len(config.q_min)))
-
-    @jax.jit
-    def run(params: Params, image: jax.Array) -> jax.Array:
-        q = jnp.broadcast_to(zeros, (len(image), zeros.shape[-1]))
-        return predict(config, params, image, q, q[:, 0])[1]
-
+def encodings(config: PredictorConfig, params: Params, image: np.ndarray) -> Encoding:
+    """What the encoder says of all images [N, 88, 136, 3], a row each."""
+    network: Any = Encoder(config.encoder)
+    weights = {"params": params["params"]["encoder"]}
+    run = jax.jit(network.apply)
     parts = batches(np.arange(len(image)), VALIDATION_BATCH)
-    features = [np.asarray(run(params, image[part])) for part in parts]
-    return np.concatenate(features)[: len(image)]
+    said = [jax.tree.map(np.asarray, run(weights, image[part])) for part in parts]
+    return jax.tree.map(lambda *each: np.concatenate(each)[: len(image)], *said)

@@ -25,6 +25,7 @@ from jaxplan.networks.policy import Window as Window
 from jaxplan.networks.policy import decode as decode
 from jaxplan.networks.policy import encode as encode
 from jaxplan.networks.policy import plain as plain
+from jaxplan.networks.policy import with_sight as with_sight
 from jaxplan.networks.predictor import Prediction as Prediction
 from jaxplan.networks.predictor import Predictor as Predictor
 from jaxplan.networks.predictor import PredictorConfig as PredictorConfig
@@ -32,6 +33,7 @@ from jaxplan.networks.predictor import as_subgoal as as_subgoal
 from jaxplan.networks.predictor import predict as predict
 from jaxplan.networks.resnet import Encoder as Encoder
 from jaxplan.networks.resnet import EncoderConfig as EncoderConfig
+from jaxplan.networks.resnet import Encoding as Encoding
 from jaxplan.networks.rows import row_by_row as row_by_row
 from jaxplan.networks.sampler import FewStepConfig as FewStepConfig
 from jaxplan.networks.sampler import SamplerConfig as SamplerConfig

@@ -35,14 +35,14 @@ class DiffusionPolicyNetwork(nn.Module):
 
     def setup(self) -> None:
         config = self.config
-        self.encoder = WindowEncoder(config, config.cond_features)
+        self.window = WindowEncoder(config, config.cond_features)
         self.step = mlp(4 * config.step_features, config.step_features)
         self.denoiser = ConditionalUnet1D(config.widths, config.kernel)
         self.modulation = nn.Dense(sum(self.denoiser.film_sizes))
 
     def cond(self, window: Window) -> tuple[jax.Array, jax.Array | None]:
         """A window as one vector [..., H cond_features], and what it says of the camera."""
-        each, error = self.encoder(window)
+        each, error = self.window(window)
         return each.reshape(*each.shape[:-2], -1), error
 
     def denoise(self, x_t: jax.Array, t: jax.Array, cond: jax.Array) -> jax.Array:

@@ -7,7 +7,7 @@ import flax.linen as nn
 import jax
 
 from jaxplan.networks.mixture import Mixture, MixtureHead
-from jaxplan.networks.policy import PolicyConfig, Window, WindowEncoder
+from jaxplan.networks.policy import WINDOW, PolicyConfig, Window, WindowEncoder
 from jaxplan.ranges import Count, Positive
 
 
@@ -34,7 +34,7 @@ class LstmGmmNetwork(nn.Module):
     def __call__(self, window: Window) -> tuple[Mixture, jax.Array | None]:
         """`[..., H, ...]`, and what the pictures say of the camera [..., H, 5]."""
         config = self.config
-        encoder = WindowEncoder(config, config.observation_features)
+        encoder = WindowEncoder(config, config.observation_features, name=WINDOW)
         h: Any
         h, error = encoder(window)
         for _ in range(config.layers):

@@ -13,7 +13,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxplan.networks.joints import normalize, unnormalize
-from jaxplan.networks.sight import SightConfig, see
+from jaxplan.networks.sight import LAYERS, SightConfig, see
 from jaxplan.ranges import Count, Number
 
 
@@ -45,7 +45,7 @@ class Window(NamedTuple):
     """The last H observations."""
 
     image: Any
-    """u8 [..., H, 88, 136, 3]."""
+    """u8 [..., H, 88, 136, 3]; in training maybe what an encoder has said of it."""
     q: Any
     """[..., H, d] [rad]."""
     gripper: Any
@@ -89,6 +89,10 @@ def decode(config: PolicyConfig, q: jax.Array, x: jax.Array) -> Chunk:
     return Chunk(joints, (x[..., -1] > 0).astype(jnp.int32))
 
 
+WINDOW = "window"
+"""What the encoder of its window is called in every policy."""
+
+
 class WindowEncoder(nn.Module):
     """Each observation of a window as a vector, and what it says of the camera."""
 
@@ -100,6 +104,21 @@ class WindowEncoder(nn.Module):
         """`[..., H, features]`, and `[..., H, 5]` where the network calibrates."""
         sight = see(self.config, *window)
         return nn.Dense(self.features)(sight.inputs), sight.camera_error
+
+
+def with_sight(params: dict[str, Any], other: dict[str, Any]) -> dict[str, Any]:
+    """A policy's weights, with the sight of another network that sees (`LAYERS`).
+
+    Raises:
+        KeyError: Theirs has other sizes.
+    """
+    mine, theirs = params["params"][WINDOW], other["params"]
+    taken = {name: theirs[name] for name in LAYERS if name in theirs}
+    for name in LAYERS:
+        shapes = [jax.tree.map(jnp.shape, side.get(name)) for side in (mine, taken)]
+        if shapes[0] != shapes[1]:
+            raise KeyError(name)
+    return {"params": params["params"] | {WINDOW: mine | taken}}
 
 
 def _steps(horizon: int) -> jax.Array:

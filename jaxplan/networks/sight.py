@@ -17,7 +17,7 @@ from jaxplan.networks.hand_camera import (
     on_plane,
 )
 from jaxplan.networks.joints import normalize
-from jaxplan.networks.resnet import Encoder, EncoderConfig
+from jaxplan.networks.resnet import Encoder, EncoderConfig, Encoding
 from jaxplan.ranges import Checked, Count, Number
 from jaxplan.robots.panda.limits import Q_MAX, Q_MIN
 
@@ -61,18 +61,35 @@ class Sight(NamedTuple):
     """[..., 5] how the camera is off its mount: yaw, pitch [rad], then right, up, back [m]."""
 
 
+LAYERS = (
+    "encoder",
+    "Dense_0",
+    "Dense_1",
+    "LayerNorm_0",
+    "camera_hidden0",
+    "camera_hidden1",
+    "camera_error",
+)
+"""What `see` adds to a module, whichever it is."""
+
+
 def see(
-    config: SightConfig, image: jax.Array, q: jax.Array, gripper: jax.Array
+    config: SightConfig,
+    image: jax.Array | Encoding,
+    q: jax.Array,
+    gripper: jax.Array,
 ) -> Sight:
     """Layers of the module in whose compact method it is called.
 
     Args:
         config: What to make of it.
-        image: u8 [..., 88, 136, 3].
+        image: u8 [..., 88, 136, 3]; or what the encoder has said of it.
         q: [..., d] [rad].
         gripper: [...], 0 or 1.
     """
-    features, keypoints = Encoder(config.encoder, name="encoder")(image)
+    if not isinstance(image, Encoding):
+        image = Encoder(config.encoder, name="encoder")(image)
+    features, keypoints = image
     state = state_vector(q, gripper, config.q_min, config.q_max)
     for _ in range(2):
         state = nn.relu(nn.Dense(config.state_features)(state))

@@ -11,7 +11,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxplan.networks.mixture import Mixture, MixtureHead
-from jaxplan.networks.policy import PolicyConfig, Window, WindowEncoder
+from jaxplan.networks.policy import WINDOW, PolicyConfig, Window, WindowEncoder
 from jaxplan.ranges import Count, Positive, Probability
 
 
@@ -44,7 +44,7 @@ class TransformerNetwork(nn.Module):
         def drop(h: jax.Array) -> jax.Array:
             return nn.Dropout(config.dropout, deterministic=not train)(h)
 
-        h, error = WindowEncoder(config, config.width)(window)
+        h, error = WindowEncoder(config, config.width, name=WINDOW)(window)
         places = nn.initializers.normal(0.02)
         h = drop(h + self.param("places", places, (config.history, config.width)))
         past = nn.make_causal_mask(jnp.ones(h.shape[:-1]))

@@ -1,6 +1,8 @@
 """What goes into a training and what comes out: data with its origin, weights before and after."""
 
 import dataclasses
+import hashlib
+import logging
 from pathlib import Path
 from typing import Any
 
@@ -9,11 +11,15 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxplan import data, learning, pretrained
+from jaxplan.learning import predictor
 from jaxplan.learning.command_line import UsageError
 from jaxplan.learning.loop import TrainConfig
 from jaxplan.learning.train_state import Params
 from jaxplan.learning.weights import merged
+from jaxplan.networks import Encoding
 from jaxplan.scene.identity import difference
+
+logger = logging.getLogger(__name__)
 
 RUNS = Path("runs")
 """Each run has a directory there."""
@@ -70,6 +76,27 @@ def split(
     return train, val
 
 
+def encoded(
+    upper: learning.Weights, image: np.ndarray, hashes: dict[str, str]
+) -> Encoding:
+    """What the predictor's encoder says of all pictures, kept for the next training.
+
+    Args:
+        upper: The predictor.
+        image: u8 [N, 88, 136, 3].
+        hashes: Checksums of the data that they are of.
+    """
+    of = hashlib.sha256("".join([upper.info["sha256"], *hashes.values()]).encode())
+    path = RUNS / "encodings" / f"{of.hexdigest()[:16]}.npz"
+    if path.is_file():
+        with np.load(path) as archive:
+            return Encoding(*(archive[name] for name in Encoding._fields))
+    logger.info("what the encoder says of %d frames, once", len(image))
+    found = predictor.encodings(upper.config, upper.params, image)
+    data.write_npz(path, found._asdict())
+    return found
+
+
 def initial(config: TrainConfig, network: str, fresh: Params) -> Params:
     """The weights that `config.init` names, if it does, in place of the fresh ones.
 
@@ -99,7 +126,7 @@ def export(
     directory = RUNS / config.name / "weights" if config.out is None else config.out
     training = dataclasses.asdict(dataclasses.replace(config, out=None))
     training.pop("network")  # `save_weights` records it
-    for paths in ("data", "init", "predictor", "teacher"):
+    for paths in ("data", "init", "predictor", "teacher", "sight"):
         training.pop(paths, None)  # the checksums say it without a machine's paths
     info = {"metrics": metrics, "training": training, **origin}
     return pretrained.save_weights(directory, network, params, config.network, info)

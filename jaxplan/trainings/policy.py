@@ -7,14 +7,18 @@ from pathlib import Path
 from typing import Any
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 
-from jaxplan import learning
+from jaxplan import learning, pretrained
 from jaxplan.data import TimedShard
 from jaxplan.learning import policy
+from jaxplan.learning.command_line import UsageError
 from jaxplan.learning.policy import PolicyTraining
 from jaxplan.learning.train_state import Params
+from jaxplan.networks import with_sight
 from jaxplan.policies import Policy, init
+from jaxplan.pretrained import UPPER
 from jaxplan.trainings import files
 
 logger = logging.getLogger(__name__)
@@ -26,13 +30,20 @@ def train_policy(kind: Policy, config: PolicyTraining) -> Path:
     logger.info("%d frames of %d episodes", len(shard.q), len(shard.episode_seed))
     config = dataclasses.replace(config, network=policy.fitted(config.network, shard))
     rows, val_rows = files.split(np.arange(len(shard.q)), shard.seed, config)
+    upper = None
+    if config.sight is not None:
+        upper = pretrained.load_weights(UPPER, config.sight)
+        origin["sight_sha256"] = upper.info["sha256"]
+        if config.encode_once:
+            said = files.encoded(upper, shard.image, origin["data"])
+            shard = shard._replace(image=said)
     loss, gather = partial(kind.loss, config), policy.Windows(shard, config.network)
     key = jax.random.key(config.seed)
     fresh = jax.jit(init, static_argnums=0)(config.network, key)
     state, metrics = learning.fit(
         config,
         files.RUNS / config.name,
-        files.initial(config, kind.name, fresh),
+        files.initial(config, kind.name, _with_sight(fresh, config, upper)),
         loss,
         policy.weighted(config, shard, rows),
         gather,
@@ -41,6 +52,25 @@ def train_policy(kind: Policy, config: PolicyTraining) -> Path:
         export=partial(_snapshot, config, kind.name, origin),
     )
     return files.export(config, kind.name, state.ema_params, metrics, origin)
+
+
+def _with_sight(
+    params: Params, config: PolicyTraining, upper: learning.Weights | None
+) -> Params:
+    """A policy's weights with the predictor's sight, if it begins with that.
+
+    Raises:
+        UsageError: The two do not see alike.
+    """
+    if upper is None:
+        return params
+    try:
+        return with_sight(params, jax.tree.map(jnp.asarray, upper.params))
+    except KeyError as error:
+        raise UsageError(
+            f"the predictor in {config.sight} sees with other --network settings: "
+            f"{error.args[0]}"
+        ) from None
 
 
 def _snapshot(

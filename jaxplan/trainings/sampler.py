@@ -1,6 +1,5 @@
 """A learned sampler, from demonstrations of a task to exported weights."""
 
-import hashlib
 import logging
 from functools import partial
 from pathlib import Path
@@ -9,9 +8,9 @@ from typing import Any
 import jax
 import numpy as np
 
-from jaxplan import data, learning, pretrained
+from jaxplan import learning, pretrained
 from jaxplan.data import Shard
-from jaxplan.learning import SegmentTraining, predictor, sampler, segments
+from jaxplan.learning import SegmentTraining, sampler, segments
 from jaxplan.learning.command_line import UsageError
 from jaxplan.learning.sampler import Gather
 from jaxplan.pretrained import UPPER
@@ -28,8 +27,9 @@ def train_sampler(family: Family, config: SegmentTraining) -> Path:
         upper = pretrained.load_weights(UPPER, config.predictor)
     shard, origin = files.read(config, Shard)
     logger.info("%d frames of %d episodes", len(shard.q), len(shard.episode_seed))
-    image = shard.image if upper is None else features(upper, shard, origin["data"])
+    image: Any = shard.image
     if upper is not None:
+        image, _ = files.encoded(upper, image, origin["data"])
         origin["predictor_sha256"] = upper.info["sha256"]
     rows = segments.eligible(shard, config.network.step_min)
     gather = partial(sampler.gather, shard, image)
@@ -100,18 +100,3 @@ def _teacher(
             f"the {family.teacher} in {config.teacher} was trained for another scene"
         )
     return teacher
-
-
-def features(
-    upper: learning.Weights, shard: Shard, hashes: dict[str, str]
-) -> np.ndarray:
-    """The predictor's image features of all frames, kept for the next sampler's training."""
-    of = hashlib.sha256("".join([upper.info["sha256"], *hashes.values()]).encode())
-    path = files.RUNS / "features" / f"{of.hexdigest()[:16]}.npz"
-    if path.is_file():
-        with np.load(path) as archive:
-            return archive["features"]
-    logger.info("image features of %d frames, once", len(shard.image))
-    found = predictor.image_features(upper.config, upper.params, shard.image)
-    data.write_npz(path, {"features": found})
-    return found
