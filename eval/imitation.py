@@ -8,6 +8,7 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from parts.imitation_tables import tables
 from tqdm import tqdm
 
 from jaxplan import tasks
@@ -24,6 +25,7 @@ from jaxplan.evaluation.imitation import (
 from jaxplan.evaluation.memo import Memo
 from jaxplan.evaluation.result import write_result
 from jaxplan.evaluation.statistics import mcnemar
+from jaxplan.evaluation.tables import markdown
 from jaxplan.learned import learned
 from jaxplan.motion import MotionPlanner
 from jaxplan.policies import POLICIES, PolicyAgent
@@ -52,7 +54,7 @@ class Args(Checked):
 
 
 def main(args: Args) -> None:
-    """Evaluates, writes JSON, prints a line an agent and the paired tests."""
+    """Evaluates, writes JSON, prints the tables."""
     seeds, study = parse_seeds(args.seeds), args.study
     if args.quick:
         seeds, study = seeds[:4], replace(study, max_actions=300)
@@ -103,20 +105,18 @@ def main(args: Args) -> None:
         for k, one in enumerate(rows)
         for other in list(rows)[k + 1 :]
     }
-    write_result(
-        args.out, {"policies": rows, "paired": paired, "config": asdict(study)}
-    )
-    for name, row in rows.items():
-        low, high = row["wilson_95"]
-        print(
-            f"{name:>16}: {row['successes']}/{row['trials']} (95 %: {low:.3f} to {high:.3f}), "
-            f"{row['collisions']['episodes']} episodes with a collision, "
-            f"{1e3 * row['seconds_per_decision']:.1f} ms a decision; {row['failures']}"
-        )
-    for pair, test in paired.items():
-        print(
-            f"{pair}: {test['only_first']} to {test['only_second']}, p {test['p']:.2g}"
-        )
+    shown = tables(study.variant, rows, paired)
+    found = {
+        "policies": rows,
+        "paired": paired,
+        "config": asdict(study),
+        "weights": [w.info["sha256"] for each in networks.values() for w in each],
+        "tables": [asdict(each) for each in shown],
+        "quick": args.quick,
+    }
+    write_result(args.out, found)
+    for each in shown:
+        print(f"\n{each.title}\n\n{markdown(each)}")
 
 
 def _successes(row: dict[str, Any]) -> list[bool]:

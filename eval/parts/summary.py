@@ -5,8 +5,9 @@ from collections.abc import Iterator
 from typing import Any
 
 from jaxplan.evaluation.tables import Cell, Estimate, Table
+from parts.imitation_tables import PAPER
 
-PAPER_SUCCESS, PAPER_NOMINAL, PAPER_ERROR = 95.67, 96.0, 0.0112
+PAPER_SUCCESS, PAPER_NOMINAL, PAPER_ERROR = PAPER["ours"], 96.0, 0.0112
 """Success of Table 1 and of Table 5 [%], toggle error of Table 5 [rad]."""
 
 OF_SETTING = ", episodes", ", success %", ", nearest toggle [rad]"
@@ -57,6 +58,17 @@ def robustness(found: Found) -> Table:
         for setting, by in rows.items()
     ]
     return Table("", ["", *columns], body)
+
+
+def imitation(found: Found) -> Table:
+    """Success of each agent, a column a file, beside the paper's."""
+    names = list(dict.fromkeys(name for r in found.values() for name in r["policies"]))
+    columns = [name.removeprefix("imitation_") for name in found]
+    rows: list[list[Any]] = []
+    for name in names:
+        of = [result["policies"].get(name) for result in found.values()]
+        rows.append([name, *(row and rate(row) for row in of), PAPER.get(name)])
+    return Table("", ["success, %", *columns, "paper"], rows)
 
 
 def recovery(found: Found) -> Table:
