@@ -8,10 +8,10 @@ choose by. A killed run goes on after the batches that it has finished (`runs/pi
 import json
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
-import tyro
 from tqdm import tqdm
+from tyro.conf import Positional
 
 from jaxplan import tasks
 from jaxplan.cli import run_script
@@ -31,7 +31,7 @@ from jaxplan.ranges import Checked
 class Args(Checked):
     """Runs each snapshot on each seed."""
 
-    runs: Annotated[tuple[Path, ...], tyro.conf.Positional]
+    runs: Positional[tuple[Path, ...]]
     """Directories of trainings, `runs/NAME`."""
     seeds: str = "150000:150032"
     """FIRST:END, END excluded. Neither trained on nor in any table."""

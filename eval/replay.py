@@ -6,10 +6,9 @@ these fail no policy can be blamed.
 
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Annotated
 
-import tyro
 from tqdm import tqdm
+from tyro.conf import Positional
 
 from jaxplan import data, tasks
 from jaxplan.cli import run_script
@@ -26,7 +25,7 @@ from jaxplan.ranges import Checked
 class Args(Checked):
     """Replays demonstrations."""
 
-    demonstrations: Annotated[Path, tyro.conf.Positional]
+    demonstrations: Positional[Path]
     """Directory that `train/collect_demos.py --timed` wrote."""
     seeds: str = "0:256"
     """FIRST:END, END excluded, of what was demonstrated."""

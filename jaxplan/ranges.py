@@ -97,7 +97,7 @@ def shown(value: Any) -> str:
 def _fits(value: Any, kind: Any) -> bool:
     origin, inner = typing.get_origin(kind), typing.get_args(kind)
     if origin is Annotated:
-        return _fits(value, inner[0]) and bool(inner[1].holds(value))
+        return _fits(value, inner[0]) and all(r.holds(value) for r in _ranges(kind))
     if origin is Literal:
         return isinstance(value, str) and value in inner
     if origin in (typing.Union, types.UnionType):
@@ -120,11 +120,16 @@ def _fits(value: Any, kind: Any) -> bool:
     return isinstance(value, kind)
 
 
+def _ranges(kind: Any) -> list[Range]:
+    """Of a type, beside what it may say to others, such as a parser of command lines."""
+    return [mark for mark in kind.__metadata__ if isinstance(mark, Range)]
+
+
 def _words(kind: Any) -> str:
     """A kind in words: "a number more than 0"."""
     origin, inner = typing.get_origin(kind), typing.get_args(kind)
     if origin is Annotated:
-        return f"{_words(inner[0])}, {inner[1].words}"
+        return ", ".join([_words(inner[0]), *(r.words for r in _ranges(kind))])
     if origin is Literal:
         return " or ".join(map(repr, inner))
     if origin in (typing.Union, types.UnionType):

@@ -9,6 +9,7 @@ import subprocess
 import sys
 import types
 import typing
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -16,6 +17,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from tyro.conf import Positional
 
 import jaxplan
 import jaxplan.evaluation
@@ -39,7 +41,7 @@ from jaxplan.motion.blocks import SIZES
 from jaxplan.motion.checks import seeds_of
 from jaxplan.motion.goals import Goals
 from jaxplan.motion.reasons import Asked, no_path
-from jaxplan.ranges import Checked, check, kinds
+from jaxplan.ranges import Checked, Count, check, kinds
 
 ARM = """
 <mujoco>
@@ -156,6 +158,23 @@ def test_numbers_of_numpy_are_numbers(settings, name):
     if isinstance(value, int | float):
         same = dataclasses.replace(settings, **{name: np.asarray(value)[()]})
         assert same == settings
+
+
+def test_marks_for_a_parser_of_command_lines_are_no_ranges():
+    @dataclass(frozen=True)
+    class Args(Checked):
+        place: Positional[Path]
+        count: Positional[Count] = 1
+        several: Positional[tuple[Path, ...]] = ()
+
+    assert Args(Path("here")).count == 1
+    for wrong, words in (
+        ({"place": "here"}, "place 'here', expected a Path"),
+        ({"count": 0}, "count 0, expected an integer, 1 to 2"),
+        ({"several": (1,)}, "several"),
+    ):
+        with pytest.raises(ValueError, match=words):
+            Args(**{"place": Path("here")} | wrong)
 
 
 @pytest.mark.parametrize(
