@@ -355,6 +355,10 @@ def test_encoding_once_leaves_the_encoder_as_it_is(
     other = ["--network.state-features", "9", "--name", "other"]
     assert train.main([*start, *other]) == 2
     assert "other --network settings: Dense_0" in capsys.readouterr().err
-    for wrong in ({}, {"sight": str(upper), "init": str(upper)}):
-        with pytest.raises(ValueError, match="encode_once: the encoder is that of"):
-            LineTraining(encode_once=True, **wrong)
+    with pytest.raises(ValueError, match="encode_once: by which encoder"):
+        LineTraining(encode_once=True)
+    # What has left the encoder cannot go on with it; what has kept it can.
+    for place, code in (("whole", 2), ("once", 0)):
+        begun = [*start, *once, "--name", place, "--init", str(tmp_path / place)]
+        assert train.main(begun) == code
+        assert ("sees by another encoder" in capsys.readouterr().err) == (code == 2)

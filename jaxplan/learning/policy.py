@@ -56,10 +56,8 @@ class PolicyTraining(TrainConfig):
             ValueError: A field makes no sense.
         """
         super().__post_init__()
-        if self.encode_once and (self.sight is None or self.init is not None):
-            raise ValueError(
-                "encode_once: the encoder is that of `sight`, and there is no `init`"
-            )
+        if self.encode_once and self.sight is None:
+            raise ValueError("encode_once: by which encoder? see sight")
 
 
 Act = Callable[[Any, Params, Window, jax.Array], jax.Array]

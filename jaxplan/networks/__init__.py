@@ -19,6 +19,7 @@ from jaxplan.networks.joints import normalize as normalize
 from jaxplan.networks.joints import unnormalize as unnormalize
 from jaxplan.networks.lstm_gmm import LstmGmmConfig as LstmGmmConfig
 from jaxplan.networks.lstm_gmm import LstmGmmNetwork as LstmGmmNetwork
+from jaxplan.networks.policy import WINDOW as WINDOW
 from jaxplan.networks.policy import Chunk as Chunk
 from jaxplan.networks.policy import PolicyConfig as PolicyConfig
 from jaxplan.networks.policy import Window as Window

@@ -16,7 +16,7 @@ from jaxplan.learning import policy
 from jaxplan.learning.command_line import UsageError
 from jaxplan.learning.policy import PolicyTraining
 from jaxplan.learning.train_state import Params
-from jaxplan.networks import with_sight
+from jaxplan.networks import WINDOW, with_sight
 from jaxplan.policies import Policy, init
 from jaxplan.pretrained import UPPER
 from jaxplan.trainings import files
@@ -43,7 +43,7 @@ def train_policy(kind: Policy, config: PolicyTraining) -> Path:
     state, metrics = learning.fit(
         config,
         files.RUNS / config.name,
-        files.initial(config, kind.name, _with_sight(fresh, config, upper)),
+        _initial(config, kind.name, fresh, upper),
         loss,
         policy.weighted(config, shard, rows),
         gather,
@@ -54,23 +54,30 @@ def train_policy(kind: Policy, config: PolicyTraining) -> Path:
     return files.export(config, kind.name, state.ema_params, metrics, origin)
 
 
-def _with_sight(
-    params: Params, config: PolicyTraining, upper: learning.Weights | None
+def _initial(
+    config: PolicyTraining, name: str, fresh: Params, upper: learning.Weights | None
 ) -> Params:
-    """A policy's weights with the predictor's sight, if it begins with that.
+    """Weights to begin with: the predictor's sight, or all of an earlier policy.
 
     Raises:
-        UsageError: The two do not see alike.
+        UsageError: They are of other sizes, or the encoder that stays as it is is another.
     """
     if upper is None:
-        return params
+        return files.initial(config, name, fresh)
     try:
-        return with_sight(params, jax.tree.map(jnp.asarray, upper.params))
+        seeing = with_sight(fresh, jax.tree.map(jnp.asarray, upper.params))
     except KeyError as error:
         raise UsageError(
             f"the predictor in {config.sight} sees with other --network settings: "
             f"{error.args[0]}"
         ) from None
+    params = files.initial(config, name, seeing)
+    mine = params["params"][WINDOW]["encoder"], upper.params["params"]["encoder"]
+    if config.encode_once and not all(map(np.array_equal, *map(jax.tree.leaves, mine))):
+        raise UsageError(
+            f"encode_once: {config.init} sees by another encoder than {config.sight}"
+        )
+    return params
 
 
 def _snapshot(
