@@ -1,19 +1,14 @@
 """Timed demonstrations: what is kept of an episode, and that it does the same once more."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
-from jaxplan import data, pretrained, train
 from jaxplan.data import FRAME_PERIOD
 from jaxplan.demonstrations import ExpertAgent, TimedRecorder
 from jaxplan.demonstrations.timed import TICKS, actions
 from jaxplan.episodes import EpisodeConfig, run_episodes
-from jaxplan.learning import loop
-from jaxplan.policies import PolicyAgent, Replay
+from jaxplan.policies import Replay
 from jaxplan.simulation.physics import CONTROL_PERIOD
-from jaxplan.trainings import files
 
 SEEDS = range(4)
 
@@ -87,46 +82,3 @@ def test_recorded_actions_do_the_same_once_more(shard, mug_task):
     assert sum(p["clipped"] for record in records for p in record.phases) == 0
     for record in records:
         assert sum(phase["toggled"] for phase in record.phases) == 4
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("kind", ["diffusion_policy", "lstm_gmm", "transformer"])
-def test_a_policy_of_four_episodes_does_them_again(
-    kind, shard, mug_task, tmp_path, monkeypatch
-):
-    """Pictures to physics: the network, how actions are coded, windows, and the interface."""
-    monkeypatch.setattr(files, "RUNS", tmp_path)
-    # One episode is always held out: a copy of the first, under a seed that the choice falls on.
-    spare = np.flatnonzero(shard.seed == SEEDS[0])
-    doubled = {
-        name: np.concatenate([column, column[spare]])
-        for name, column in shard._asdict().items()
-        if not name.startswith("episode")
-    }
-    doubled["seed"][-len(spare) :] = held_out_seed()
-    data.write_shard(data.shard_path(tmp_path, 0), shard._replace(**doubled))
-    made = {"task": "mug", "camera": "hand", "robot": "panda"}
-    data.write_manifest(tmp_path, made)
-    compact = Path(__file__).parents[1] / "configs" / "compact.py"
-    sizes = {
-        "diffusion_policy": ["--network.widths", "32", "64"],
-        "lstm_gmm": ["--network.width", "128", "--batch-size", "16"],
-        "transformer": ["--network.layers", "2", "--network.width", "96"],
-    }
-    arguments = [kind, "--config", str(compact), "--data", str(tmp_path), *sizes[kind]]
-    arguments += ["--sight", str(pretrained.DIRECTORY), "--encode-once"]
-    arguments += ["--steps", "1500", "--out", str(tmp_path / "w")]
-    assert train.main(arguments) == 0
-    agent = PolicyAgent(mug_task, pretrained.load_weights(kind, tmp_path / "w"))
-    config = EpisodeConfig(max_phases=250, max_stuck=50)
-    records = run_episodes(mug_task, agent, SEEDS, config)
-    assert sum(record.success for record in records) >= 3
-
-
-def held_out_seed() -> int:
-    """A seed that is held out beside those four."""
-    return next(
-        seed
-        for seed in range(10_000, 20_000)
-        if loop.held_out(np.array([*SEEDS, seed]), 0.05)[-1]
-    )
