@@ -61,12 +61,10 @@ def main(args: Args) -> None:
         seeds = [e["seed"] for e in row["episodes"] if e["kind"] == typical(row)]
         if name in POLICIES and seeds:
             panels = strip(study, name, args.policies, seeds[0])
-            captions = [""] * (PANELS - 1) + [typical(row)]
-            heading = [f"{name}, seed {seeds[0]}"]
+            captions = [f"{name}, seed {seeds[0]}"] + [""] * (PANELS - 2)
+            captions.append(typical(row))
             width = (WIDTH - GAP) // PANELS - GAP
-            page = sheet(
-                [panels], [captions], headings=heading, width=width, letters=False
-            )
+            page = sheet([panels], [captions], width=width, letters=False)
             parts.append(page)
     page = Image.new("RGB", (WIDTH, sum(part.height for part in parts)), PAPER)
     top = 0

@@ -62,6 +62,7 @@ def robustness(found: Found) -> Table:
 
 def imitation(found: Found) -> Table:
     """Success of each agent, a column a file, beside the paper's."""
+    found = {name: result for name, result in found.items() if "policies" in result}
     names = list(dict.fromkeys(name for r in found.values() for name in r["policies"]))
     columns = [name.removeprefix("imitation_") for name in found]
     rows: list[list[Any]] = []
