@@ -10,16 +10,16 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from parts.summary import rate
 from tqdm import tqdm
 from tyro.conf import Positional
 
-from jaxplan import tasks
 from jaxplan.cli import run_script
 from jaxplan.evaluation import parse_seeds
 from jaxplan.evaluation.imitation import ImitationConfig, evaluate_agent, settings_of
 from jaxplan.evaluation.memo import Memo
 from jaxplan.evaluation.result import write_result
-from jaxplan.evaluation.tables import Estimate, Table, markdown
+from jaxplan.evaluation.tables import Table, markdown
 from jaxplan.learning import Weights
 from jaxplan.policies import POLICIES, PolicyAgent
 from jaxplan.pretrained import load_weights
@@ -45,7 +45,7 @@ def main(args: Args) -> None:
     """Evaluates, writes JSON, prints a table a run."""
     seeds = parse_seeds(args.seeds)
     study = replace(args.study, batch=min(args.study.batch, len(seeds)))
-    task = tasks.load(study.task, study.batch, study.variant, study.camera)
+    task = study.load(study.batch)
     tables: list[Table] = []
     for run in args.runs:
         places = sorted((run / "snapshots").glob("*"))
@@ -67,8 +67,7 @@ def main(args: Args) -> None:
                     bar.update,
                 )
             step = int(place.name)
-            rate = (100 * x for x in (found["success_rate"], *found["wilson_95"]))
-            rows.append([step, Estimate(*rate), *metrics.get(step, [None] * 3)])
+            rows.append([step, rate(found), *metrics.get(step, [None] * 3)])
         columns = ["step", "success, %", "loss", "joints [rad]", "toggles, %"]
         tables.append(Table(f"{run.name}, {len(seeds)} episodes", columns, rows))
         print(f"\n{tables[-1].title}\n\n{markdown(tables[-1])}", flush=True)

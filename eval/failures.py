@@ -15,7 +15,6 @@ from figures import small
 from pictures.sheet import GAP, INK, LINE, PAPER, sheet
 from PIL import Image, ImageDraw
 
-from jaxplan import tasks
 from jaxplan.base import Phase
 from jaxplan.cli import run_script
 from jaxplan.config import from_dict
@@ -58,11 +57,12 @@ def main(args: Args) -> None:
     study = from_dict(ImitationConfig, found["config"])
     parts = [bars(found["policies"])]
     for name, row in found["policies"].items():
-        seeds = [e["seed"] for e in row["episodes"] if e["kind"] == typical(row)]
+        kind = typical(row)
+        seeds = [e["seed"] for e in row["episodes"] if e["kind"] == kind]
         if name in POLICIES and seeds:
             panels = strip(study, name, args.policies, seeds[0])
             captions = [f"{name}, seed {seeds[0]}"] + [""] * (PANELS - 2)
-            captions.append(typical(row))
+            captions.append(kind)
             width = (WIDTH - GAP) // PANELS - GAP
             page = sheet([panels], [captions], width=width, letters=False)
             parts.append(page)
@@ -117,9 +117,7 @@ def strip(
     study: ImitationConfig, name: str, weights: Path, seed: int
 ) -> list[Image.Image]:
     """An episode of a policy, evenly from its start to its end."""
-    task = tasks.load(
-        study.task, 1, study.variant, study.camera, perturbation=study.perturbation
-    )
+    task = study.load(1)
     agent = PolicyAgent(task, load_weights(name, weights))
     paint = Painter(task, "near")
     moments: list[Moment] = []

@@ -68,13 +68,7 @@ def main(args: Args) -> None:
         name: load_pair(place) if name == OURS else (load_weights(name, args.policies),)
         for name in args.agents
     }
-    task = tasks.load(
-        study.task,
-        study.batch,
-        study.variant,
-        study.camera,
-        perturbation=study.perturbation,
-    )
+    task = study.load(study.batch)
     rows: dict[str, Any] = {}
     for name, weights in networks.items():
         if name == OURS:

@@ -10,7 +10,7 @@ from pathlib import Path
 from tqdm import tqdm
 from tyro.conf import Positional
 
-from jaxplan import data, tasks
+from jaxplan import data
 from jaxplan.cli import run_script
 from jaxplan.data import TimedShard
 from jaxplan.evaluation import parse_seeds
@@ -41,7 +41,7 @@ def main(args: Args) -> None:
     if not seeds:
         raise ValueError(f"no solved episode of {args.seeds} in {args.demonstrations}")
     study = args.study
-    task = tasks.load(study.task, study.batch, study.variant, study.camera)
+    task = study.load(study.batch)
     digest = data.sha256(args.demonstrations / data.MANIFEST)
     settings = {"agent": "replay", "study": asdict(study), "data": digest}
     agent = Replay(task, shard._replace(image=shard.seed))

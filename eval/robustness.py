@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from parts.summary import rate
 from pictures.sheet import Key, sheet
 from PIL import Image
 from tqdm import tqdm
@@ -24,7 +25,7 @@ from jaxplan.cli import run_script
 from jaxplan.evaluation import ClosedLoop, ClosedLoopConfig, parse_seeds
 from jaxplan.evaluation.memo import Memo
 from jaxplan.evaluation.result import write_result
-from jaxplan.evaluation.tables import Estimate, Table, markdown
+from jaxplan.evaluation.tables import Table, markdown
 from jaxplan.learning import Weights
 from jaxplan.pictures.painter import CLOSES, SUBGOAL, Mark, marked
 from jaxplan.pretrained import load_pair, shipped
@@ -187,11 +188,11 @@ def table(found: dict[str, dict[str, Any]]) -> Table:
     """A row a setting, the paper's figures beside ours."""
     rows = []
     for name, one in found.items():
-        low, high = one["wilson_95"]
-        rate = Estimate(100 * one["success_rate"], 100 * low, 100 * high)
         errors = one["toggle_error_nearest"], one["toggle_error_next"]
         kinds = ", ".join(f"{kind} {n}" for kind, n in one["failures"].items())
-        rows.append([name, rate, PAPER.get(name), *errors, ERRORS.get(name), kinds])
+        rows.append(
+            [name, rate(one), PAPER.get(name), *errors, ERRORS.get(name), kinds]
+        )
     columns = ["setting", "success %", "paper %", "to the nearest toggle [rad]"]
     columns += ["to the next [rad]", "paper, nearest [rad]", "failures"]
     return Table("Robustness", columns, rows)
@@ -201,9 +202,9 @@ def shortfalls(found: dict[str, dict[str, Any]], variant: str) -> list[str]:
     """Where success, or the error to the nearest toggle, is not what we want."""
     lines = []
     for name, one in found.items():
-        rate, aim = 100 * one["success_rate"], AIMS.get(variant, {}).get(name)
-        if aim is not None and rate < aim:
-            lines.append(f"{variant}, {name}: success {rate:.1f} % (aim {aim})")
+        percent, aim = 100 * one["success_rate"], AIMS.get(variant, {}).get(name)
+        if aim is not None and percent < aim:
+            lines.append(f"{variant}, {name}: success {percent:.1f} % (aim {aim})")
         error, aim = one["toggle_error_nearest"], ERRORS.get(name)
         if error is not None and aim is not None and error > aim:
             lines.append(

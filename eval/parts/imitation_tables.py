@@ -3,15 +3,8 @@
 from collections.abc import Mapping
 from typing import Any
 
-from jaxplan.evaluation.tables import Estimate, Table
-
-PAPER = {
-    "ours": 95.67,
-    "diffusion_policy": 89.33,
-    "lstm_gmm": 69.67,
-    "transformer": 60.33,
-}
-"""Success of Table 1 [%]."""
+from jaxplan.evaluation.tables import Table
+from parts.summary import PAPER, rate
 
 
 def tables(
@@ -29,12 +22,9 @@ def tables(
         dict.fromkeys(kind for row in rows.values() for kind in row["failures"])
     )
     for name, row in rows.items():
-        rate = (100 * x for x in (row["success_rate"], *row["wilson_95"]))
         hit = 100 * row["collisions"]["episodes"] / row["trials"]
         ms = 1e3 * row["seconds_per_decision"]
-        success.append(
-            [name, Estimate(*rate), PAPER.get(name), hit, row["clipped"], ms]
-        )
+        success.append([name, rate(row), PAPER.get(name), hit, row["clipped"], ms])
         failures.append([name, *(row["failures"].get(kind, 0) for kind in kinds)])
     tests = [
         [pair, test["only_first"], test["only_second"], f"{test['p']:.2g}"]

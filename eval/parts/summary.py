@@ -5,8 +5,14 @@ from collections.abc import Iterator
 from typing import Any
 
 from jaxplan.evaluation.tables import Cell, Estimate, Table
-from parts.imitation_tables import PAPER
 
+PAPER = {
+    "ours": 95.67,
+    "diffusion_policy": 89.33,
+    "lstm_gmm": 69.67,
+    "transformer": 60.33,
+}
+"""Success of Table 1 [%]."""
 PAPER_SUCCESS, PAPER_NOMINAL, PAPER_ERROR = PAPER["ours"], 96.0, 0.0112
 """Success of Table 1 and of Table 5 [%], toggle error of Table 5 [rad]."""
 

@@ -34,6 +34,16 @@ class ImitationConfig(Checked):
     perturbation: Perturbation = NOMINAL
     """What varies in the pictures."""
 
+    def load(self, batch: int) -> Tabletop:
+        """The simulated world, for so many episodes in lockstep."""
+        return tasks.load(
+            self.task,
+            batch,
+            self.variant,
+            self.camera,
+            perturbation=self.perturbation,
+        )
+
     @property
     def episode(self) -> EpisodeConfig:
         """When an episode of a policy is given up."""
