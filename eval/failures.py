@@ -11,8 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from figures import small
-from pictures.sheet import GAP, INK, LINE, PAPER, sheet
+from pictures.sheet import GAP, INK, LINE, PAPER, sheet, small
 from PIL import Image, ImageDraw
 
 from jaxplan.base import Phase

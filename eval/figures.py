@@ -17,7 +17,7 @@ from typing import NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
-from pictures.sheet import INK, PAPER, Key, blank, sheet
+from pictures.sheet import Key, blank, sheet, small
 from PIL import Image
 
 from jaxplan import tasks
@@ -208,17 +208,6 @@ def legend() -> list[Key]:
         ("dot", painter.OPENS, "toggle: open"),
     )
     return [Key(shape, color, text) for shape, color, text in entries]
-
-
-def small(page: Image.Image) -> Image.Image:
-    """The page in 256 colours, those of paper and marks among them: a third of the size."""
-    kept = (PAPER, INK, *painter.MARKS)
-    common = 256 - len(kept)
-    palette = (page.quantize(common).getpalette() or [])[: 3 * common]
-    palette += [0] * (3 * common - len(palette))
-    colors = Image.new("P", (1, 1))
-    colors.putpalette(palette + [c for color in kept for c in color])
-    return page.quantize(palette=colors, dither=Image.Dither.NONE)
 
 
 def _longest(scenes: Sequence[Scene], stage: int) -> Scene:

@@ -5,6 +5,8 @@ from typing import NamedTuple
 
 from PIL import Image, ImageDraw
 
+from jaxplan.pictures.painter import MARKS
+
 Color = tuple[int, int, int]
 INK: Color = (25, 25, 25)
 PAPER: Color = (255, 255, 255)
@@ -94,3 +96,14 @@ def _entry(draw: ImageDraw.ImageDraw, x: int, y: int, key: Key) -> int:
         draw.line((x + 7, y + 4, x + 7, y + 18), key.color, 4)
     draw.text((x + 20, y + 2), key.text, INK, font_size=16)
     return round(x + 44 + draw.textlength(key.text, font_size=16))
+
+
+def small(page: Image.Image) -> Image.Image:
+    """The page in 256 colours, those of paper and marks among them: a third of the size."""
+    kept = (PAPER, INK, *MARKS)
+    common = 256 - len(kept)
+    palette = (page.quantize(common).getpalette() or [])[: 3 * common]
+    palette += [0] * (3 * common - len(palette))
+    colors = Image.new("P", (1, 1))
+    colors.putpalette(palette + [c for color in kept for c in color])
+    return page.quantize(palette=colors, dither=Image.Dither.NONE)

@@ -10,6 +10,7 @@ from jaxplan.collision import World
 from jaxplan.ik import Limits, Pose, inverse_kinematics
 from jaxplan.motion import checks
 from jaxplan.planning import Status
+from jaxplan.planning.space import short_way
 from jaxplan.scene import Scene
 
 MOST = 64
@@ -64,7 +65,7 @@ def goals_of(
         raise ValueError(f"q_goal has shape {q.shape}, expected ({d},) or (goals, {d})")
     if len(q) == 1:
         return Goals(q, 1, None, q[:0])
-    gap = np.where(limits.circular, _wrapped(q - q_start), q - q_start)
+    gap = np.where(limits.circular, short_way(q - q_start), q - q_start)
     q = q[np.argsort(np.linalg.norm(gap, axis=1), kind="stable")]
     within = np.isfinite(q) & (q >= limits.q_min) & (q <= limits.q_max)
     inside = np.asarray(within.all(1))
@@ -116,7 +117,3 @@ def stacked(goals: list[Goals]) -> np.ndarray:
     most = max(len(goal.q) for goal in goals)
     size = 1 << (most - 1).bit_length()
     return np.stack([goal.q[np.arange(size) % len(goal.q)] for goal in goals])
-
-
-def _wrapped(angle: np.ndarray) -> np.ndarray:
-    return angle - 2 * np.pi * np.round(angle / (2 * np.pi))

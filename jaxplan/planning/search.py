@@ -43,6 +43,8 @@ WIDENING = 16
 """There is one worker to so many expansions that went before, up to all of them."""
 FINEST = 8
 """Halvings of the resolution at most."""
+FEW = 32
+"""Configurations of one call of a single search."""
 
 
 def empty(problems: Problem, space: Space, config: PlannerConfig) -> State:
@@ -271,5 +273,8 @@ def _check(
 
 
 def rows_for(lanes: int, config: PlannerConfig) -> int:
-    """Configurations of one call: a single search has few at a time."""
-    return min(config.check_rows, max(16, lanes * config.workers))
+    """Configurations of one call: a single search has few at a time.
+
+    A call costs as much before its first row as some thirty rows do.
+    """
+    return min(config.check_rows, max(FEW, lanes * config.workers))

@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -22,6 +23,11 @@ def rounded(product: jax.Array) -> jax.Array:
     through a maximum.
     """
     return jnp.maximum(product, -jnp.finfo(jnp.float32).max)
+
+
+def short_way(gap: Any) -> Any:
+    """Differences of angles, an array of NumPy or JAX, by the nearest whole number of turns."""
+    return gap - TURN * (gap / TURN).round()
 
 
 def dot(a: Float[Array, "... d"], b: Float[Array, "... d"]) -> Float[Array, "..."]:
@@ -88,7 +94,7 @@ class Space:
         """Differences of one joint, the short way round if it is circular."""
         if not self.circular[joint]:
             return gap
-        return gap - TURN * jnp.round(gap / TURN)
+        return short_way(gap)
 
     def gap(self, q0: jax.Array, q1: jax.Array) -> jax.Array:
         """`[..., d]` the shortest way from q0 to q1."""

@@ -19,6 +19,7 @@ from jaxplan.collision.obstacles import FAR, SIZES
 from jaxplan.learning.weights import Weights, WeightsError
 from jaxplan.networks import SceneCond
 from jaxplan.planning import DrawBank
+from jaxplan.planning.space import short_way
 from jaxplan.samplers.bank import SIZE, Bank
 from jaxplan.scene import Scene
 from jaxplan.scene.identity import difference, identity
@@ -126,7 +127,7 @@ def condition(
         bring the links [m]. Things: slots, then objects: kind or name as one of several, size,
         position [m], rotation.
     """
-    way = jnp.where(scene.circular, _wrapped(q_goal - q_start), q_goal - q_start)
+    way = jnp.where(scene.circular, short_way(q_goal - q_start), q_goal - q_start)
     ends = q_start + jnp.array([0.0, 0.5, 1.0])[:, None] * way
     # Only where links are; what is held and what the fingers do is not said.
     batch_last = World(*(leaf[..., None] for leaf in world))
@@ -157,7 +158,3 @@ def _joints(scene: Scene, q: jax.Array) -> jax.Array:
     half = jnp.where(bounded, 0.5 * (high - low), jnp.pi)
     plain = jnp.where(scene.circular, jnp.sin(q), (q - centre) / half)
     return jnp.concatenate([plain, jnp.cos(q[:, scene.circular])], axis=-1)
-
-
-def _wrapped(angle: jax.Array) -> jax.Array:
-    return angle - 2 * jnp.pi * jnp.round(angle / (2 * jnp.pi))
