@@ -15,6 +15,7 @@ from planning_spheres import (
     Oracle,
     Spheres,
     config_free,
+    jit,
     noisy_sampler,
     points_free,
     problems,
@@ -58,7 +59,7 @@ def settings_of(**changes):
 def planner(config, d=7, circular=()):
     """`circular`: indices of joints that come round, for whoever fears no obstacles there."""
     limit, round_ = np.full(d, Q_MAX), np.isin(np.arange(d), circular)
-    return make_planner(config_free, config, -limit, limit, circular=round_)
+    return make_planner(config_free, config, -limit, limit, jit, round_)
 
 
 @cache
@@ -66,7 +67,7 @@ def _grown(config, d):
     space = Space.of(np.full(d, -Q_MAX), np.full(d, Q_MAX), None, config.metric)
     go, rounds = jnp.array(False), jnp.int32(2**30)
 
-    @jax.jit
+    @jit
     def grow(worlds, state, problems, status, bank):
         def free(problem, q):
             return config_free(worlds, problem, q)
@@ -85,7 +86,7 @@ def _grown(config, d):
             status,
         )
 
-    return jax.jit(begin), grow
+    return jit(begin), grow
 
 
 def searched_trees(config, worlds, q_start, q_goal, q_toggle, keys, draw):
@@ -543,7 +544,7 @@ def test_compiles_once():
 
     limit = np.full(7, Q_MAX)
     config = settings_of(max_expansions=60)
-    plan = make_planner(counted, config, -limit, limit)
+    plan = make_planner(counted, config, -limit, limit, jit)
     for seed in range(4):
         worlds, q_start, q_goal, keys = problems(6, seed=seed)
         draw = noisy_sampler(q_start, q_goal, keys, rows=2)
@@ -586,7 +587,7 @@ def test_the_sampler_is_asked_when_a_search_asks():
     worlds, q_start, q_goal, keys = problems(6, seed=3)
     config = settings_of(method="rrt_connect", max_expansions=60)
     limit = np.full(7, Q_MAX)
-    plan = make_planner(config_free, config, -limit, limit)
+    plan = make_planner(config_free, config, -limit, limit, jit)
     draw, asked = noisy_sampler(q_start, q_goal, keys), []
 
     def listened(bank_number):

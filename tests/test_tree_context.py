@@ -6,7 +6,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from planning_spheres import Spheres, config_free
+from planning_spheres import Spheres, config_free, jit
 
 from jaxplan.config import PAPER_PLANNER
 from jaxplan.planning import Segment, Status, make_planner
@@ -37,7 +37,7 @@ def corner(count):
 
 def planner(**settings):
     config = replace(PAPER_PLANNER, goal_bias=0.0, **settings)
-    return make_planner(config_free, config, -LIMIT, LIMIT)
+    return make_planner(config_free, config, -LIMIT, LIMIT, jit)
 
 
 @pytest.mark.parametrize("method", ["rrt", "rrt_connect"])
