@@ -10,15 +10,10 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxplan.collision import XLA_OPTIONS
 from jaxplan.planning import Segment, points_for
 from jaxplan.planning.proposal import draw_numbers
 
 Q_MAX = 2.0
-jit = partial(
-    jax.jit, compiler_options=XLA_OPTIONS | {"xla_backend_optimization_level": 0}
-)
-"""For programs of a test, which run for milliseconds: compiles in a third of the time."""
 
 
 class Spheres(NamedTuple):

@@ -11,10 +11,10 @@ import jax
 import mujoco
 import numpy as np
 import pytest
+from quick import jit
 
 import jaxplan
 from jaxplan.collision import (
-    XLA_OPTIONS,
     Obstacle,
     World,
     clearance,
@@ -41,7 +41,6 @@ POSES = {
     for i, (kind, (x, y)) in enumerate(zip(ROBOT, PLACES, strict=True))
 }
 """Obstacles around an arm that stands in the origin."""
-QUICK = {**XLA_OPTIONS, "xla_backend_optimization_level": 0}
 TOLERANCE = 1e-4
 
 
@@ -126,7 +125,7 @@ def test_all_kinds_agree_with_mujoco(case: Case):
     def ask(q: jax.Array):
         return clearance(scene, world, q), config_free(scene, world, q, 0.01)
 
-    distance, free = map(np.asarray, jax.jit(ask, compiler_options=QUICK)(q))
+    distance, free = map(np.asarray, jit(ask)(q))
     expected = clearance_mujoco(scene, world, q, reach=0.05)
     apart = expected > 0
     assert 0 < apart.mean() < 1
@@ -151,7 +150,7 @@ def test_a_geom_of_explicit_pairs_meets_every_slot():
     boxes = [Obstacle("box", [0.1, 0.1, 0.1], [x, 0, 0]) for x in (-0.6, 0.9)]
     world = make_world(scene, obstacles=boxes)
     q = np.array([[-0.3], [0.0], [0.5]], np.float32)
-    ask = jax.jit(clearance, compiler_options=QUICK)
+    ask = jit(clearance)
     np.testing.assert_allclose(ask(scene, world, q), [0.1, 0.1, 0.2], atol=1e-6)
 
 
@@ -173,7 +172,8 @@ def test_the_planner_answers_whole_questions():
 
 WIDE = """
 import jax, numpy as np
-from test_kinds import QUICK, SMALL, TOGETHER, build, clearance, config_free, near
+from quick import jit
+from test_kinds import SMALL, TOGETHER, build, clearance, config_free, near
 scene, world = build(TOGETHER)
 q = near(scene, world, 4)
 assert q.dtype == np.float32 and scene.model.geom_pos.dtype == np.float64
@@ -183,7 +183,7 @@ for motion in (None, 0.1 + 0.0 * q):
     free = jax.eval_shape(config_free, scene, world, q, 0.01, motion=motion)
     assert free.dtype == bool
 scene, world = build(SMALL[0])
-ask = jax.jit(clearance, compiler_options=QUICK)
+ask = jit(clearance)
 assert np.isfinite(ask(scene, world, near(scene, world, 4))).all()
 """
 

@@ -10,8 +10,8 @@ import jax.numpy as jnp
 import mujoco
 import numpy as np
 import pytest
+from quick import jit
 
-from jaxplan.collision import XLA_OPTIONS
 from jaxplan.collision.convex import least_convex
 from jaxplan.collision.hulls import read_hulls
 from jaxplan.collision.narrow import CLOSED, SOLID
@@ -22,7 +22,6 @@ MARGIN = 0.01
 ROWS = 128
 VERTICES = 10_000
 # Half the time to compile, and the same sums.
-QUICK = {**XLA_OPTIONS, "xla_backend_optimization_level": 0}
 PAIRS = [
     *CLOSED,
     *(pair for pair in combinations_with_replacement(SOLID, 2) if pair not in CLOSED),
@@ -132,7 +131,7 @@ def rated(kinds: tuple[str, str]):
         free = least(a, b, Score(exact=False, margin=margin)) > 0
         return least(a, b, Score(exact=True)), free
 
-    return jax.jit(rate, compiler_options=QUICK)
+    return jit(rate)
 
 
 def cores_apart(kinds, a: Shapes, b: Shapes, distance: np.ndarray) -> np.ndarray:

@@ -15,11 +15,11 @@ from planning_spheres import (
     Oracle,
     Spheres,
     config_free,
-    jit,
     noisy_sampler,
     points_free,
     problems,
 )
+from quick import jit
 
 from jaxplan.config import PAPER_PLANNER
 from jaxplan.planning import (
@@ -139,7 +139,7 @@ def test_staged_checks_give_the_verdicts_of_all_checks(rows):
             free, jnp.asarray(problem), q0, q1, jnp.asarray(10 * asked), rows
         )
 
-    verdicts, checks = (np.asarray(x) for x in jax.jit(check)(q0, q1))
+    verdicts, checks = (np.asarray(x) for x in jit(check)(q0, q1))
     expected = asked & points_free(worlds, problem, q0, q1, 10)
     np.testing.assert_array_equal(verdicts, expected)
     assert 10 < expected.sum() < asked.sum() - 5
@@ -148,7 +148,7 @@ def test_staged_checks_give_the_verdicts_of_all_checks(rows):
     assert np.all(checks[~asked] == 0)
 
     counts = rng.integers(0, 20, 60).astype(np.int32)
-    dense = jax.jit(
+    dense = jit(
         lambda q0, q1: all_free(
             free, jnp.asarray(problem), q0, q1, jnp.asarray(counts), rows
         )

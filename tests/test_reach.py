@@ -6,9 +6,9 @@ import jax
 import mujoco
 import numpy as np
 import pytest
+from quick import jit
 
 from jaxplan.collision import (
-    XLA_OPTIONS,
     Obstacle,
     World,
     clearance,
@@ -21,13 +21,12 @@ from jaxplan.collision import (
 from jaxplan.collision.positions import carry, qpos_rows
 from jaxplan.scene import Scene, geom_pairs
 
-QUICK = {**XLA_OPTIONS, "xla_backend_optimization_level": 0}
 HINGE, SLIDE = mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE
 ROWS = 400
 BAND = 1e-5
-ask = jax.jit(config_free, static_argnums=4, compiler_options=QUICK)
-distance = jax.jit(clearance, static_argnums=3, compiler_options=QUICK)
-most = jax.jit(motion_bound, compiler_options=QUICK)
+ask = jit(config_free, static_argnums=4)
+distance = jit(clearance, static_argnums=3)
+most = jit(motion_bound)
 ALL = ("sphere", "capsule", "ellipsoid", "cylinder", "box", "mesh")
 
 

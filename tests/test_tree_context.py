@@ -6,7 +6,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from planning_spheres import Spheres, config_free, jit
+from planning_spheres import Spheres, config_free
+from quick import jit
 
 from jaxplan.config import PAPER_PLANNER
 from jaxplan.planning import Segment, Status, make_planner

@@ -1,13 +1,12 @@
 """Our own distance beside C MuJoCo's: all pairs of kinds, thin and large, deep and apart."""
 
-import jax
 import jax.numpy as jnp
 import mujoco
 import numpy as np
 import pytest
+from quick import jit
 
 from jaxplan.collision import (
-    XLA_OPTIONS,
     World,
     clearance,
     clearance_mujoco,
@@ -18,7 +17,6 @@ from jaxplan.scene import Scene
 KINDS = "sphere", "capsule", "ellipsoid", "cylinder", "box", "mesh"
 REACH = 0.05
 DRAWS, ROWS = 12, 12
-QUICK = {**XLA_OPTIONS, "xla_backend_optimization_level": 0}
 
 
 def bodies(side: str, kinds: tuple[str, ...]) -> str:
@@ -50,7 +48,7 @@ def answers() -> dict[str, np.ndarray]:
     worlds = make_world(scene)._replace(
         ignored=jnp.asarray(~np.eye(len(groups), dtype=bool)[:, None])
     )
-    ours = jax.jit(clearance, compiler_options=QUICK)
+    ours = jit(clearance)
     found = []
     for _ in range(DRAWS):
         size = 10 ** rng.uniform(-3.3, -0.5, scene.model.geom_size.shape)
