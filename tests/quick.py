@@ -6,6 +6,7 @@ import jax
 
 from jaxplan.collision import XLA_OPTIONS
 
-QUICK = {**XLA_OPTIONS, "xla_backend_optimization_level": 0}
-"""A third of the time that a search takes to compile otherwise."""
-jit = partial(jax.jit, compiler_options=QUICK)
+jit = partial(
+    jax.jit, compiler_options={**XLA_OPTIONS, "xla_backend_optimization_level": 0}
+)
+"""A search compiles in a third of the time, and the sums are the same."""

@@ -21,7 +21,6 @@ BAND = 1e-4
 MARGIN = 0.01
 ROWS = 128
 VERTICES = 10_000
-# Half the time to compile, and the same sums.
 PAIRS = [
     *CLOSED,
     *(pair for pair in combinations_with_replacement(SOLID, 2) if pair not in CLOSED),

@@ -43,8 +43,8 @@ WIDENING = 16
 """There is one worker to so many expansions that went before, up to all of them."""
 FINEST = 8
 """Halvings of the resolution at most."""
-FEW = 32
-"""Configurations of one call of a single search."""
+LEAST_ROWS = 32
+"""Configurations of one call: it costs as much before its first one as some thirty do."""
 
 
 def empty(problems: Problem, space: Space, config: PlannerConfig) -> State:
@@ -273,8 +273,5 @@ def _check(
 
 
 def rows_for(lanes: int, config: PlannerConfig) -> int:
-    """Configurations of one call: a single search has few at a time.
-
-    A call costs as much before its first row as some thirty rows do.
-    """
-    return min(config.check_rows, max(FEW, lanes * config.workers))
+    """Configurations of one call: a single search has few at a time."""
+    return min(config.check_rows, max(LEAST_ROWS, lanes * config.workers))
