@@ -6,7 +6,8 @@
 One proposal at a time (`workers=1`), so that counts are those of the sequential
 algorithms. Trials are the recorded episodes that ended well; a search that fails counts
 with its whole budget. Phases whose straight motion is not free are shown apart: the others
-tell nothing about a sampler.
+tell nothing about a sampler. So are those that lead past an obstacle by one of several ways, by
+whether the episode closes one.
 """
 
 import math
@@ -21,6 +22,7 @@ from jaxplan.cli import run_script
 from jaxplan.data import TOGGLES
 from jaxplan.evaluation.expansions import Counts, normalised, solved_share
 from jaxplan.evaluation.methods import BACKBONES, METHODS, OURS, Backbone, planner
+from jaxplan.evaluation.problems import RecordedProblems
 from jaxplan.evaluation.recorded_study import RecordedStudy, StudyArgs
 from jaxplan.evaluation.result import Result
 from jaxplan.evaluation.tables import Table
@@ -62,6 +64,7 @@ def main(args: Args) -> None:
         groups = [
             Group("all phases", np.ones(len(rows), bool)),
             Group("blocked phases", some.blocked),
+            *past_the_obstacle(some, len(study.task.zones)),
         ]
         for group in groups:
             tables.append(compare(backbone, group, counts))
@@ -73,6 +76,17 @@ def main(args: Args) -> None:
     result.show()
     result.write(args.path("expansions"))
     print(f"written to {args.path('expansions')}")
+
+
+def past_the_obstacle(problems: RecordedProblems, ways: int) -> list[Group]:
+    """Phases that can be passed by several ways, with all of them open and with one closed."""
+    if ways < 2:
+        return []
+    last = problems.blocked & (problems.toggle == len(TOGGLES) - 1)
+    return [
+        Group("past the obstacle, all ways open", last & ~problems.closed),
+        Group("past the obstacle, a way closed", last & problems.closed),
+    ]
 
 
 def compare(backbone: Backbone, group: Group, counts: dict[str, Counts]) -> Table:
@@ -118,7 +132,9 @@ def compare(backbone: Backbone, group: Group, counts: dict[str, Counts]) -> Tabl
     )
 
 
-def per_toggle(backbone: Backbone, problems, counts: dict[str, Counts]) -> Table:
+def per_toggle(
+    backbone: Backbone, problems: RecordedProblems, counts: dict[str, Counts]
+) -> Table:
     """Mean expansions by the toggle that comes next; blocked phases, failures at N_rrt."""
     every = np.ones(len(problems.toggle), bool)
     groups = [

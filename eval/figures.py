@@ -168,8 +168,9 @@ def figure5(
     directory: Path,
     scenes: Sequence[Scene],
 ) -> Image.Image:
-    """The long phases before both grasps and the first release, proposed for by each sampler."""
-    chosen = [_longest(scenes, 0), _longest(scenes, 1), _longest(scenes, 2)]
+    """Three long phases, proposed for by each sampler: where there are ways, the last too."""
+    stages = (0, 1, 3) if loop.task.zones else (0, 1, 2)
+    chosen = [_longest(scenes, stage) for stage in stages]
     rows: list[list[Image.Image]] = [[] for _ in chosen]
     captions: list[list[str]] = [[] for _ in chosen]
     for title, name in SAMPLERS.items():

@@ -66,7 +66,6 @@ def main(args: Args) -> None:
     rows = np.flatnonzero(study.problems.blocked & (study.problems.toggle == 3))
     rows, ways = by_each_way(study, rows)
     problems = study.problems.take(rows)
-    open_ = np.abs(problems.slot_pose[:, :, :3]).max(axis=(1, 2)) > 100
     points = points_for(PAPER_PLANNER.step_max, PAPER_PLANNER.edge_resolution)
     free = jit(
         lambda worlds, q0, q1: collision.motion_free(
@@ -80,7 +79,10 @@ def main(args: Args) -> None:
             asked[name] = propose(study, free, problems, banks, rows, ways, args.banks)
     tables = [
         table(f"{words} ({int(some.sum())})", asked, some)
-        for words, some in (("nothing closed", open_), ("a way closed", ~open_))
+        for words, some in (
+            ("nothing closed", ~problems.closed),
+            ("a way closed", problems.closed),
+        )
         if some.any()
     ]
     seconds = time.perf_counter() - start

@@ -1,7 +1,9 @@
 """The data set's card says what its shards hold."""
 
 import sys
+from collections import Counter
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -54,3 +56,18 @@ def test_a_card_is_for_people_too(collection):
     text = (directory / "CARD.md").read_text()
     assert "8 episodes from seed 0, of which the expert solved 7; 32 frames" in text
     assert "| the mug is outside the box | 1 |" in text
+
+
+def test_a_card_counts_the_ways_that_episodes_took(collection, monkeypatch):
+    _, shard = collection
+    ways = SimpleNamespace(zones={"left", "right"}, way=lambda q: str(q[0, 0]))
+    monkeypatch.setattr(card.tasks, "load", lambda *_: ways)
+    toggle = np.where(shard.seed < 6, 3, 2).astype(
+        np.int8
+    )  # the others' ways count not
+    q = shard.path_q.copy()
+    q[shard.path, 0, 0] = shard.seed % 4
+    described = card.describe(shard._replace(path_q=q, toggle=toggle), SETTINGS)
+    seeds = np.unique(shard.seed[toggle == 3])
+    assert len(seeds) == 6
+    assert described["ways"] == Counter(str(float(seed % 4)) for seed in seeds)

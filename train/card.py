@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from jaxplan import data
+from jaxplan import data, tasks
 from jaxplan.data import (
     TOGGLES,
     Demonstrations,
@@ -61,15 +61,30 @@ def describe(shard: Demonstrations, settings: dict[str, Any]) -> dict[str, Any]:
         "frames_by_toggle": {
             name: int((shard.toggle == i).sum()) for i, name in enumerate(TOGGLES)
         },
-        **(_paths(shard) if isinstance(shard, Shard) else _pace(shard)),
+        **(_paths(shard, settings) if isinstance(shard, Shard) else _pace(shard)),
     }
 
 
-def _paths(shard: Shard) -> dict[str, float]:
+def _paths(shard: Shard, settings: dict[str, Any]) -> dict[str, Any]:
     return {
         "paths": len(shard.path_q),
         "path_length_median [rad]": float(np.median(shard.path_length)),
+        "ways": ways_taken(shard, settings),
     }
+
+
+def ways_taken(shard: Shard, settings: dict[str, Any]) -> dict[str, int]:
+    """Episodes by the way that their last motions took, where the scene has several."""
+    name, _, variant = settings["task"].partition("_")
+    task = tasks.load(name, 1, variant or "plain", settings["camera"])
+    if not task.zones:
+        return {}
+    there = (shard.toggle == len(TOGGLES) - 1) & (shard.path != data.NO_PATH)
+    taken = {
+        (seed, task.way(shard.path_q[path]))
+        for seed, path in zip(shard.seed[there], shard.path[there], strict=True)
+    }
+    return dict(sorted(Counter(way for _, way in taken if way).items()))
 
 
 def _pace(shard: TimedShard) -> dict[str, float]:
@@ -117,6 +132,7 @@ def as_markdown(card: dict[str, Any]) -> str:
         *_table("Randomised", "value", card["randomised"]),
         *_table("Frames before", "number", card["frames_by_toggle"]),
         *_table("Failure", "episodes", card["failures"]),
+        *_table("Way", "episodes", card.get("ways", {})),
     ]
     for name, parts in card["success_by_start"].items():
         lines += _table(name, "succeeded", parts)

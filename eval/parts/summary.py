@@ -92,10 +92,16 @@ def expansions(found: Found) -> Table:
     """Expansions over those of ours, in the phases that a straight motion does not solve."""
     return _side_by_side(
         found,
-        r"(?P<column>\w+), blocked phases",
+        r"(?P<column>rrt\w*), blocked phases",
         "normalised, failures at N_rrt",
         "Blocked phases; failures count as the whole budget.",
     )
+
+
+def ways(found: Found) -> Table:
+    """How proposals lie about the ways of a problem, all of them open."""
+    first = found["proposed_ways"]["tables"][0]
+    return Table("", ["", *first["columns"][1:]], first["rows"])
 
 
 def proposals(found: Found) -> Table:

@@ -13,6 +13,7 @@ import jax
 import numpy as np
 
 from jaxplan.collision import World
+from jaxplan.collision.obstacles import FAR
 from jaxplan.data import (
     MANIFEST,
     DataError,
@@ -75,6 +76,11 @@ class RecordedProblems(NamedTuple):
     def episode(self) -> np.ndarray:
         """i64 [P] which episode (trial) each problem belongs to, counted from 0."""
         return np.unique(self.seed, return_inverse=True)[1]
+
+    @property
+    def closed(self) -> np.ndarray:
+        """bool [P]: the episode closes a way, its zone stands in a slot."""
+        return np.asarray((self.slot_pose[:, :, 2] < FAR[2]).any(axis=1))
 
     def take(self, rows: np.ndarray) -> "RecordedProblems":
         """Some of the problems."""

@@ -118,6 +118,10 @@ class Tabletop(ABC):
         """Ways that an episode may close, by name, and the zone that closes each."""
         return {}
 
+    def way(self, path: np.ndarray) -> str | None:
+        """Which of `zones`' ways joints `path [T, d]` [rad] take, or None."""
+        return None
+
     def watch(self) -> Watch:
         """Who tells failures by kind."""
         return Watch()

@@ -15,7 +15,7 @@ from jaxplan.tasks.mug.demonstrated import expert_planner
 from jaxplan.tasks.mug.expert import Expert
 from jaxplan.tasks.mug.mug import MugShape, planning_geoms
 from jaxplan.tasks.mug.watch import MugWatch
-from jaxplan.tasks.mug.ways import closed_way
+from jaxplan.tasks.mug.ways import closed_way, way_of
 from jaxplan.tasks.perturbation import NOMINAL, Perturbation
 from jaxplan.tasks.tabletop import ONE, Tabletop, full_name
 
@@ -76,6 +76,10 @@ class MugTask(Tabletop):
     def zones(self) -> dict[str, Obstacle]:
         """Of the variant."""
         return {name: zone.obstacle for name, zone in self._layout.zones.items()}
+
+    def way(self, path: np.ndarray) -> str | None:
+        """Past the post, if there is one."""
+        return way_of(np.array([self.tcp_at(q) for q in path])) if self.zones else None
 
     def watch(self) -> MugWatch:
         """Who tells failures by kind."""
