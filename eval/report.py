@@ -1,4 +1,4 @@
-"""Writes RESULTS.md and `docs/results/` from the JSON files in `eval/results/`.
+"""Writes RESULTS.md and the pages of results in `docs/` from the files in `eval/results/`.
 
     python eval/report.py
 
@@ -30,7 +30,7 @@ class Section(NamedTuple):
     """A heading, the files whose tables stand under it, and what differs from the paper."""
 
     page: str
-    """Its file under `docs/results/`."""
+    """Its file under `docs/`."""
     title: str
     files: tuple[str, ...]
     command: str
@@ -41,7 +41,7 @@ class Section(NamedTuple):
 
 SECTIONS = (
     Section(
-        "success",
+        "results/success",
         "Table 1, our row, and Table 5, nominal: success and toggle error",
         ("success", "success_cluttered", "success_ways"),
         "python eval/success.py --seeds 200000:200300 --out eval/results/success.json",
@@ -51,7 +51,7 @@ SECTIONS = (
         summary.success,
     ),
     Section(
-        "imitation",
+        "results/imitation",
         "Table 1: ours and imitation policies",
         (
             "imitation_plain",
@@ -77,7 +77,7 @@ SECTIONS = (
         summary.imitation,
     ),
     Section(
-        "robustness",
+        "results/robustness",
         "Table 5: other cameras, noise, light, colours, mugs",
         (
             "robustness_plain",
@@ -99,7 +99,7 @@ SECTIONS = (
         summary.robustness,
     ),
     Section(
-        "expansions",
+        "results/expansions",
         "Table 2: normalised RRT expansions",
         ("expansions_plain", "expansions_cluttered", "expansions_ways"),
         "python eval/expansions.py --variant plain",
@@ -121,7 +121,7 @@ SECTIONS = (
         summary.expansions,
     ),
     Section(
-        "ways",
+        "results/ways",
         "Which of several ways samplers propose",
         ("proposed_ways",),
         "python eval/ways.py",
@@ -132,7 +132,7 @@ SECTIONS = (
         summary.ways,
     ),
     Section(
-        "proposals",
+        "results/proposals",
         "Table 3: time of one proposal",
         ("proposal_time",),
         "python eval/proposal_time.py",
@@ -141,7 +141,7 @@ SECTIONS = (
         summary.proposals,
     ),
     Section(
-        "first_solutions",
+        "results/first_solutions",
         "Table 4: time to first solution of an episode",
         (
             "ttfs_plain",
@@ -158,7 +158,7 @@ SECTIONS = (
         summary.first_solutions,
     ),
     Section(
-        "ablations",
+        "results/ablations",
         "Ablations",
         ("ablations_plain", "ablations_cluttered"),
         "python eval/ablations.py --variant plain",
@@ -166,7 +166,7 @@ SECTIONS = (
         None,
     ),
     Section(
-        "recovery",
+        "results/recovery",
         "Recovery after a failed grasp",
         ("success_noisy", "success_noisy_regrasp"),
         "python eval/success.py --seeds 210000:210064 --study.prediction-noise 0.03 "
@@ -176,7 +176,7 @@ SECTIONS = (
         summary.recovery,
     ),
     Section(
-        "scene_sampler",
+        "results/scene_sampler",
         "Samplers of a scene, on MotionBenchMaker's problems",
         ("scene_sampler",),
         "python eval/scene_sampler.py --out eval/results/scene_sampler.json",
@@ -187,12 +187,23 @@ SECTIONS = (
         summary.scene_sampler,
     ),
     Section(
-        "speed",
+        "results/speed",
         "Speed beside MuJoCo, OMPL, PyBullet and PyTorch",
         ("benchmark", "motion_bench", "motion_bench_fetch"),
         "python eval/benchmark.py --update-baseline",
         "Not in the paper. Both sides of a ratio were measured in one run on one machine.",
         summary.speed,
+    ),
+    Section(
+        "reliability",
+        "Reliability: what must not happen, and how often it did",
+        ("reliability",),
+        "python eval/reliability.py",
+        "Not in the paper. Each row is a promise, tried as often as it says, at random but "
+        "repeatably; the last column is what was measured of other systems. Quick forms of the "
+        "same trials are tests. What a certificate means, and what it does not cover, is on "
+        "[a page of its own](guarantee.md).",
+        None,
     ),
 )
 MOST = 3
@@ -241,8 +252,8 @@ def report(results: Path = RESULTS, root: Path = ROOT) -> dict[str, str]:
             for name in section.files
             if (path := results / f"{name}.json").is_file()
         }
-        pages[f"docs/results/{section.page}.md"] = _page(section, found)
-        parts.append(f"## [{section.title}](docs/results/{section.page}.md)\n")
+        pages[f"docs/{section.page}.md"] = _page(section, found)
+        parts.append(f"## [{section.title}](docs/{section.page}.md)\n")
         if not found:
             parts.append(_missing(section))
         elif section.summary is not None:

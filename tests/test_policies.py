@@ -16,7 +16,7 @@ from toy_timed import JOINTS, timed
 
 from jaxplan import data, policies, train
 from jaxplan.base import Observation
-from jaxplan.learning import WeightsError, loop
+from jaxplan.learning import Weights, WeightsError, loop
 from jaxplan.learning.augment import AugmentConfig
 from jaxplan.learning.policy import (
     PolicyTraining,
@@ -331,6 +331,25 @@ def test_a_picture_and_what_the_encoder_says_of_it_teach_the_same(kind):
         for seen in (shard, shard._replace(image=said))
     ]
     jax.tree.map(partial(np.testing.assert_allclose, rtol=1e-4), *values)
+
+
+def test_kept_encodings_that_are_damaged_are_made_again(tmp_path, monkeypatch):
+    """Any single bit: the archive says so, or the arrays are the same."""
+    monkeypatch.setattr(files, "RUNS", tmp_path)
+    rng, made = np.random.default_rng(0), []
+    said = files.Encoding(*(rng.normal(size=(2, 3)) for _ in files.Encoding._fields))
+    monkeypatch.setattr(files.predictor, "encodings", lambda *_: made.append(1) or said)
+    weights = Weights(None, {}, {"sha256": "of the predictor"})
+    ask = partial(files.encoded, weights, np.zeros(2), {"data": "of the data"})
+    ask()
+    (path,) = (tmp_path / "encodings").iterdir()
+    whole = path.read_bytes()
+    for _ in range(200):
+        content = bytearray(whole)
+        content[rng.integers(len(content))] ^= 1 << rng.integers(8)
+        path.write_bytes(content)
+        jax.tree.map(np.testing.assert_array_equal, ask(), said)
+    assert len(made) > 100
 
 
 def test_encoding_once_leaves_the_encoder_as_it_is(

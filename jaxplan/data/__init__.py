@@ -1,7 +1,10 @@
 """What a demonstration is: schema, shards on disk, checksums."""
 
+from jaxplan.data.files import SEAL as SEAL
 from jaxplan.data.files import UnwritableError as UnwritableError
 from jaxplan.data.files import check_writable as check_writable
+from jaxplan.data.files import intact as intact
+from jaxplan.data.files import sealed as sealed
 from jaxplan.data.files import sha256 as sha256
 from jaxplan.data.files import write_atomic as write_atomic
 from jaxplan.data.files import write_npz as write_npz

@@ -2,19 +2,37 @@
 
 import hashlib
 import io
+import json
 import os
 import tempfile
 import zipfile
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+
+SEAL = "seal"
+"""In JSON files, their own checksum."""
 
 
 def sha256(path: str | os.PathLike) -> str:
     """Hex SHA-256 of a file."""
     with open(path, "rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def sealed(content: Mapping[str, Any]) -> dict[str, Any]:
+    """What JSON will give back of some content, with a checksum of all of it."""
+    plain = {name: value for name, value in content.items() if name != SEAL}
+    text = json.dumps(plain, sort_keys=True)
+    digest = hashlib.sha256(text.encode()).hexdigest()
+    return json.loads(text) | {SEAL: digest}
+
+
+def intact(content: Mapping[str, Any]) -> bool:
+    """Whether content that was sealed is as it was."""
+    return content.get(SEAL) == sealed(content)[SEAL]
 
 
 def write_atomic(path: str | os.PathLike, content: bytes) -> None:

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from jaxplan.data.files import sha256, write_atomic, write_npz
+from jaxplan.data.files import intact, sealed, sha256, write_atomic, write_npz
 from jaxplan.data.schema import (
     KINDS,
     DataError,
@@ -92,11 +92,8 @@ def write_manifest(directory: str | os.PathLike, settings: Mapping) -> dict:
 def save_manifest(
     directory: str | os.PathLike, settings: Mapping, shards: Mapping[str, str]
 ) -> dict:
-    """Writes `{"settings": ..., "shards": {name: SHA-256}}`, which it returns."""
-    manifest = {
-        "settings": json.loads(json.dumps(dict(settings))),
-        "shards": dict(shards),
-    }
+    """Writes `{"settings": ..., "shards": {name: SHA-256}}` and its seal, which it returns."""
+    manifest = sealed({"settings": dict(settings), "shards": dict(shards)})
     text = json.dumps(manifest, indent=2, sort_keys=True) + "\n"
     write_atomic(Path(directory) / MANIFEST, text.encode())
     return manifest
@@ -109,12 +106,12 @@ def read_manifest(directory: str | os.PathLike) -> dict:
         raise DataError(f"no such data directory: {directory}")
     try:
         manifest = json.loads((directory / MANIFEST).read_text())
-        if not isinstance(manifest["shards"], dict) or "settings" not in manifest:
-            raise KeyError("shards")
+        if not intact(manifest):
+            raise ValueError("changed")
         return manifest
     except FileNotFoundError:
         raise DataError(f"no {MANIFEST} in {directory}: unfinished?") from None
-    except (ValueError, KeyError, TypeError):
+    except (ValueError, AttributeError):
         raise DataError(f"damaged manifest: {directory / MANIFEST}") from None
 
 

@@ -7,7 +7,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from jaxplan.data import write_atomic
+from jaxplan.data import intact, sealed, write_atomic
 
 PLANNING = ("planning",)
 SAMPLING = (*PLANNING, "samplers", "diffusion", "networks", "learning")
@@ -32,12 +32,13 @@ class Memo:
         if path.is_file():
             try:
                 stored = json.loads(path.read_text(encoding="utf-8"))
-                if stored["key"] == key:
+                if intact(stored) and stored["key"] == key:
                     return stored["result"]
-            except (ValueError, KeyError, TypeError):
+            except (ValueError, AttributeError):
                 pass  # damaged: made again
         result = make()
-        write_atomic(path, json.dumps({"key": key, "result": result}).encode())
+        piece = sealed({"key": key, "result": result})
+        write_atomic(path, json.dumps(piece).encode())
         return result
 
 

@@ -1,7 +1,7 @@
 """Weights as shipped: npz files without pickle, and a manifest that ties them down.
 
 `manifest.json` holds, for each network, the file's SHA-256, the network's config, the data
-set's checksum, the commit, the versions and the held-out metrics.
+set's checksum, the commit, the versions and the held-out metrics, and a checksum of all that.
 """
 
 import dataclasses
@@ -12,13 +12,21 @@ from collections.abc import Iterator
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
+from zipfile import BadZipFile
 
 import jax
 import numpy as np
 
 from jaxplan import policies
 from jaxplan.config import from_dict
-from jaxplan.data import IMAGE_SHAPE, sha256, write_atomic, write_npz
+from jaxplan.data import (
+    IMAGE_SHAPE,
+    intact,
+    sealed,
+    sha256,
+    write_atomic,
+    write_npz,
+)
 from jaxplan.learning.weights import NoWeights, Weights, WeightsError
 from jaxplan.networks import PolicyConfig, Predictor, PredictorConfig
 from jaxplan.policies import POLICIES
@@ -57,14 +65,16 @@ def save_weights(
     flat = _flatten(jax.device_get(params))
     write_npz(path, {key: _shortened(flat[key]) for key in _shapes(config, flat)})
     manifest = _read_manifest(directory) if (path.parent / MANIFEST).exists() else {}
-    manifest[name] = {
-        "file": path.name,
-        "sha256": sha256(path),
-        "config": dataclasses.asdict(config),
-        "commit": _commit(),
-        "versions": {p: version(p) for p in ("jax", "flax", "optax", "numpy")},
-        **info,
-    }
+    manifest[name] = sealed(
+        {
+            "file": path.name,
+            "sha256": sha256(path),
+            "config": dataclasses.asdict(config),
+            "commit": _commit(),
+            "versions": {p: version(p) for p in ("jax", "flax", "optax", "numpy")},
+            **info,
+        }
+    )
     text = json.dumps(manifest, indent=2, sort_keys=True) + "\n"
     write_atomic(path.parent / MANIFEST, text.encode())
     return path
@@ -92,10 +102,12 @@ def load_weights(name: str, directory: str | os.PathLike = DIRECTORY) -> Weights
         )
     info = manifest[name]
     try:
-        path = Path(directory) / info["file"]
+        if not intact(info):
+            raise ValueError("its checksum differs")
+        path = Path(directory) / Path(info["file"]).name
         digest = info["sha256"]
         config = from_dict(config_class(name), info["config"])
-    except (KeyError, TypeError, ValueError) as error:
+    except (AttributeError, KeyError, TypeError, ValueError) as error:
         where = Path(directory) / MANIFEST
         raise WeightsError(f"damaged manifest: {where} ({name}: {error})") from None
     if not path.is_file():
@@ -104,8 +116,11 @@ def load_weights(name: str, directory: str | os.PathLike = DIRECTORY) -> Weights
         raise WeightsError(
             f"damaged weights: {path} (checksum differs from {MANIFEST})"
         )
-    with np.load(path, allow_pickle=False) as archive:
-        flat = {key: archive[key] for key in archive.files}
+    try:
+        with np.load(path, allow_pickle=False) as archive:
+            flat = {key: archive[key] for key in archive.files}
+    except (ValueError, BadZipFile) as error:
+        raise WeightsError(f"damaged weights: {path} ({error})") from None
     _check_shapes(path, flat, _shapes(config, flat))
     return Weights(config, _unflatten(flat), info)
 

@@ -89,8 +89,11 @@ def encoded(
     of = hashlib.sha256("".join([upper.info["sha256"], *hashes.values()]).encode())
     path = RUNS / "encodings" / f"{of.hexdigest()[:16]}.npz"
     if path.is_file():
-        with np.load(path) as archive:
-            return Encoding(*(archive[name] for name in Encoding._fields))
+        try:
+            with np.load(path, allow_pickle=False) as archive:
+                return Encoding(*(archive[name] for name in Encoding._fields))
+        except Exception as error:  # a broken archive raises nearly anything
+            logger.warning("%s is damaged (%s): made again", path, error)
     logger.info("what the encoder says of %d frames, once", len(image))
     found = predictor.encodings(upper.config, upper.params, image)
     data.write_npz(path, found._asdict())
