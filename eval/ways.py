@@ -5,13 +5,13 @@
 
 Recorded problems whose straight motion is blocked are solved once more by each way alone, the
 others closed. What can be solved by two or more is what this is about: how many of a sampler's
-proposals are free, how many of the ways get at least 5 % of them (`evaluation.coverage`), how far
-they are from the nearest way. Problems of episodes that close a way are shown apart: the sampler is
-not told.
+proposals are free, how many of the ways get at least 5 % of them (`evaluation.coverage`: a proposal
+belongs to the way whose closing takes it away), how far they are from the nearest way. Problems of
+episodes that close a way are shown apart: the sampler is not told.
 """
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -22,6 +22,7 @@ from tqdm import tqdm
 
 from jaxplan import collision
 from jaxplan.cli import run_script
+from jaxplan.collision import Obstacle, World
 from jaxplan.collision.obstacles import fill
 from jaxplan.config import PAPER_PLANNER
 from jaxplan.evaluation.coverage import ENOUGH, Coverage, coverage
@@ -94,21 +95,16 @@ def main(args: Args) -> None:
 
 def by_each_way(
     study: RecordedStudy, rows: np.ndarray
-) -> tuple[np.ndarray, list[list[np.ndarray]]]:
-    """Of some problems those that two ways or more solve, and the paths `[T, d]` of each."""
+) -> tuple[np.ndarray, list[dict[str, np.ndarray]]]:
+    """Of some problems those that two ways or more solve, and a path `[T, d]` by each."""
     planner, zones = study.task.expert_planner(), study.task.zones
-    found: dict[int, list[np.ndarray]] = {int(row): [] for row in rows}
+    found: dict[int, dict[str, np.ndarray]] = {int(row): {} for row in rows}
     for left in tqdm(zones, desc="ways"):
         closed = [zone for name, zone in zones.items() if name != left]
-        pose, size = (np.asarray(leaf) for leaf in fill(study.scene, closed))
         for first in range(0, len(rows), SHARD):
             part = rows[first : first + SHARD]
             lanes = np.pad(part, (0, SHARD - len(part)), mode="edge")
-            some = study.problems.take(lanes)
-            some = some._replace(
-                slot_pose=np.broadcast_to(pose, (SHARD, *pose.shape)),
-                slot_size=np.broadcast_to(size, (SHARD, *size.shape)),
-            )
+            some = closing(study, study.problems.take(lanes), closed)
             motion = planner.plan(
                 jax.tree.map(jnp.asarray, some.worlds),
                 some.q_start,
@@ -119,7 +115,7 @@ def by_each_way(
             )
             for lane, row in enumerate(part):
                 if len(motion.q[lane]) > 1:
-                    found[int(row)].append(motion.q[lane][::4])
+                    found[int(row)][left] = motion.q[lane][::4]
     several = [row for row, ways in found.items() if len(ways) > 1]
     return np.array(several, int), [found[row] for row in several]
 
@@ -130,7 +126,7 @@ def propose(
     problems: RecordedProblems,
     banks: KeptBanks,
     rows: np.ndarray,
-    ways: list[list[np.ndarray]],
+    ways: list[dict[str, np.ndarray]],
     count: int,
 ) -> Proposed:
     """A sampler's proposals for problems `rows`, and how they lie."""
@@ -140,12 +136,39 @@ def propose(
     ends = np.concatenate([np.asarray(part.end) for part in drawn], axis=1)
     limits = study.task.robot.limits
     ends = np.clip(ends, limits.q_min, limits.q_max).astype(np.float32)
-    worlds = jax.tree.map(jnp.asarray, problems.worlds)
-    shares = [
-        np.asarray(free(worlds, base[:, i], ends[:, i])) for i in range(base.shape[1])
+
+    def free_in(worlds: World) -> np.ndarray:
+        worlds = jax.tree.map(jnp.asarray, worlds)
+        columns = zip(base.swapaxes(0, 1), ends.swapaxes(0, 1), strict=True)
+        return np.stack([free(worlds, *column) for column in columns], axis=1)
+
+    own = free_in(problems.worlds)
+    all_open = free_in(closing(study, problems, []).worlds)
+    lost = {
+        name: all_open & ~free_in(closing(study, problems, [zone]).worlds)
+        for name, zone in study.task.zones.items()
+    }
+    found = [
+        coverage(
+            np.stack([lost[name][i] for name in paths], axis=1),
+            ends[i],
+            list(paths.values()),
+        )
+        for i, paths in enumerate(ways)
     ]
-    found = [coverage(each, paths) for each, paths in zip(ends, ways, strict=True)]
-    return Proposed(np.mean(shares, axis=0), found)
+    return Proposed(own.mean(axis=1), found)
+
+
+def closing(
+    study: RecordedStudy, problems: RecordedProblems, zones: Sequence[Obstacle]
+) -> RecordedProblems:
+    """The same problems with these zones, and no others."""
+    pose, size = (np.asarray(leaf) for leaf in fill(study.scene, zones))
+    many = len(problems.seed)
+    return problems._replace(
+        slot_pose=np.broadcast_to(pose, (many, *pose.shape)),
+        slot_size=np.broadcast_to(size, (many, *size.shape)),
+    )
 
 
 def table(title: str, asked: dict[str, Proposed], some: np.ndarray) -> Table:
@@ -165,7 +188,12 @@ def table(title: str, asked: dict[str, Proposed], some: np.ndarray) -> Table:
         )
     columns = ["sampler", "free %", "ways covered %", "phases with all ways %"]
     columns += ["the rarest way gets %", "to the nearest way [rad]"]
-    return Table(title, columns, rows, f"A way is covered by {ENOUGH:.0%} of them.")
+    return Table(
+        title,
+        columns,
+        rows,
+        f"A way is covered by {ENOUGH:.0%} of them that would be lost with it.",
+    )
 
 
 def shortfalls(asked: dict[str, Proposed]) -> list[str]:

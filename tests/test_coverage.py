@@ -17,24 +17,33 @@ def cloud(centre, count, seed=0):
     return np.array(centre) + np.random.default_rng(seed).normal(0, 0.05, (count, 2))
 
 
+def lost(ends):
+    """Zones across either way at a height of 1.5 to 2.5."""
+    across = np.abs(ends[:, 1] - 2) < 0.5
+    return np.stack([across & (ends[:, 0] < -0.5), across & (ends[:, 0] > 0.5)], axis=1)
+
+
 @pytest.mark.parametrize("left", [0, 1, 4, 6, 50, 94, 96, 100])
 def test_shares_are_counted_by_way(left):
     ends = np.concatenate([cloud([-1, 2], left), cloud([1, 2], 100 - left)])
-    found = coverage(ends, [LEFT, RIGHT])
+    found = coverage(lost(ends), ends, [LEFT, RIGHT])
     np.testing.assert_allclose(found.shares, [left / 100, 1 - left / 100])
     np.testing.assert_array_equal(found.covered, [left >= 5, left <= 95])
     assert found.distance < 0.1
 
 
 def test_where_ways_are_one_a_proposal_belongs_to_none():
-    assert coverage(cloud([0, 0], 50), [LEFT, RIGHT]).shares.sum() == 0
-    mean_of_two = coverage(cloud([0, 2], 50), [LEFT, RIGHT])
-    assert mean_of_two.shares.sum() == 0
-    assert mean_of_two.distance > 0.9
+    ends = cloud([0, 0], 50)
+    assert coverage(lost(ends), ends, [LEFT, RIGHT]).shares.sum() == 0
+    middle = cloud([0, 2], 50)
+    found = coverage(lost(middle), middle, [LEFT, RIGHT])
+    assert found.shares.sum() == 0
+    assert found.distance > 0.9
 
 
-def test_one_way_has_all():
-    assert coverage(cloud([5, 5], 10), [LEFT]).shares == 1
+def test_what_is_lost_with_either_way_belongs_to_none():
+    both = np.ones((10, 2), bool)
+    assert coverage(both, cloud([0, 2], 10), [LEFT, RIGHT]).shares.sum() == 0
 
 
 @settings(max_examples=50, deadline=None)

@@ -5,9 +5,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-CLEAR, APART = 0.5, 0.2
-"""A proposal belongs to a way if it is nearer to it than this share of its distance to others, and
-they are farther than this [rad]: where ways begin and end together it belongs to none."""
 ENOUGH = 0.05
 """A way is covered by this share of the proposals."""
 
@@ -26,18 +23,22 @@ class Coverage(NamedTuple):
         return self.shares >= ENOUGH
 
 
-def coverage(ends: np.ndarray, ways: Sequence[np.ndarray]) -> Coverage:
-    """Of proposals that lead to `ends [N, d]`, for ways `[T, d]` [rad]."""
-    gaps = np.stack([to_path(ends, way) for way in ways])
-    nearest = gaps.min(axis=0)
-    others = np.stack(
-        [
-            np.delete(gaps, i, axis=0).min(axis=0, initial=np.inf)
-            for i in range(len(ways))
-        ]
-    )
-    shares = ((gaps < CLEAR * others) & (others > APART)).mean(axis=1)
-    return Coverage(shares, float(np.median(nearest)))
+def coverage(
+    lost: np.ndarray, ends: np.ndarray, ways: Sequence[np.ndarray]
+) -> Coverage:
+    """A proposal belongs to the one way whose closing takes it away.
+
+    Where ways begin and end together it belongs to none, and what no way goes through, the mean
+    of two, is lost with neither, or with both.
+
+    Args:
+        lost: bool `[N, W]`: proposals that are free, and would not be with a way closed.
+        ends: `[N, d]` where they lead [rad].
+        ways: `[T, d]` each [rad].
+    """
+    one = lost & (lost.sum(axis=1, keepdims=True) == 1)
+    gaps = np.min([to_path(ends, way) for way in ways], axis=0)
+    return Coverage(one.mean(axis=0), float(np.median(gaps)))
 
 
 def to_path(q: np.ndarray, path: np.ndarray) -> np.ndarray:
