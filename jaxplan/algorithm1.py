@@ -2,7 +2,8 @@
 
     observe -> predict -> plan -> smooth -> execute -> toggle, until the terminal region
 
-One predictor call, one sampler call and one planner call a round serve all lanes.
+One predictor call, one sampler call and one planner call a round serve all lanes; where a search
+gave up, another follows with other random numbers.
 """
 
 from collections.abc import Callable, Sequence
@@ -17,7 +18,7 @@ from jaxplan.collision import World
 from jaxplan.episodes import moves, phase_keys
 from jaxplan.motion import Motion, MotionPlanner
 from jaxplan.planning import DrawBank, Status
-from jaxplan.ranges import Checked, NotNegative, Positive, Whole
+from jaxplan.ranges import Checked, Count, NotNegative, Positive, Whole
 from jaxplan.trajectory import Rung
 
 Predict = Callable[[Observation, list[int]], tuple[Subgoal, np.ndarray | None]]
@@ -35,6 +36,10 @@ class Algorithm1Config(Checked):
     stands on the table may stop the hand a little before it."""
     stall_phases: Whole = 4
     """After so many phases without a toggle the subgoal is the toggle itself."""
+    tries: Count = 6
+    """Searches of a phase, each with N_rrt expansions and random numbers of its own, before the arm
+    goes where the last one came nearest to the goal: from a dead end the networks see what no
+    demonstration has shown."""
     carry_speed: Positive = 0.6
     """Factor on velocities (squared: on accelerations) while the gripper is closed."""
     settle: NotNegative = 0.15
@@ -157,21 +162,33 @@ class Algorithm1:
         at_toggle = np.all(subgoal.q_goal == subgoal.q_toggle, axis=1)
         at_toggle &= running & (subgoal.gripper_toggle != observation.gripper)
         worlds = task.worlds(self._touched | at_toggle)
-        keys = phase_keys(self._seeds, np.full(task.batch, number))
-        draw = None
-        if self._propose is not None:
-            draw = self._propose(observation, features, subgoal, keys)
         running[empty] = False
-        motion = self.planner.plan(
-            worlds,
-            q_start=observation.q,
-            q_goal=subgoal.q_goal,
-            q_toggle=subgoal.q_toggle,
-            keys=keys,
-            draw=draw,
-            active=running,
-            speed=np.where(observation.gripper, config.carry_speed, 1.0),
-        )
+        keys = phase_keys(self._seeds, np.full(task.batch, number))
+
+        def search(
+            keys: jax.Array, active: np.ndarray
+        ) -> tuple[DrawBank | None, Motion]:
+            draw = None
+            if self._propose is not None:
+                draw = self._propose(observation, features, subgoal, keys)
+            return draw, self.planner.plan(
+                worlds,
+                q_start=observation.q,
+                q_goal=subgoal.q_goal,
+                q_toggle=subgoal.q_toggle,
+                keys=keys,
+                draw=draw,
+                active=active,
+                speed=np.where(observation.gripper, config.carry_speed, 1.0),
+            )
+
+        draw, motion = search(keys, running)
+        for attempt in range(1, config.tries):
+            open_ = running & (motion.result.status == Status.BUDGET_EXHAUSTED)
+            if not open_.any():
+                break
+            others = jax.vmap(lambda key, n=attempt: jax.random.fold_in(key, n))(keys)
+            motion = motion.then(search(others, open_)[1], open_)
         self._gave_up = empty
         decision = Decision(
             subgoal, at_toggle, leaving, empty + backing, worlds, draw, motion

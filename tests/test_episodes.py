@@ -1,11 +1,13 @@
 """Episodes of Algorithm 1 with the expert in the networks' place, and with bad predictors."""
 
+import jax
 import numpy as np
 
 from jaxplan.algorithm1 import Algorithm1, Algorithm1Config
 from jaxplan.base import Subgoal
 from jaxplan.demonstrations import ExpertAgent
 from jaxplan.episodes import EpisodeConfig, run_episodes
+from jaxplan.planning import Status
 from jaxplan.robots import PANDA
 from jaxplan.tasks.mug import poses
 from jaxplan.tasks.mug.task import MugTask
@@ -130,6 +132,47 @@ def test_a_subgoal_beside_the_toggle_is_the_toggle(mug_task, mug_planner):
         np.testing.assert_allclose(way[-1], ends, atol=1e-3)
         assert action.gripper[lane][-1] == merged[lane]
         assert not action.gripper[lane][:-1].any()
+
+
+class GivesUp:
+    """A planner whose first searches come to nothing, in each lane so many."""
+
+    def __init__(self, planner, times):
+        self.limits, self._planner, self._times = planner.limits, planner, times
+        self.asked, self.found = [], []
+
+    def plan(self, *arguments, active, keys, **given):
+        motion = self._planner.plan(*arguments, active=active, keys=keys, **given)
+        over = active & (np.array(self._times) > len(self.asked))
+        status = np.where(over, Status.BUDGET_EXHAUSTED, motion.result.status)
+        self.asked.append((active.copy(), jax.random.key_data(keys)))
+        self.found.append(motion.result.expansions)
+        return motion._replace(result=motion.result._replace(status=status))
+
+
+def test_a_search_that_gave_up_is_followed_by_another(mug_task, mug_planner):
+    """Only where it did, with other random numbers, `tries` in all; costs add up."""
+    mug_task.reset(range(4), range(4))
+    goal = np.tile(PANDA.q_home + np.array([0.3, 0, 0, 0, 0, 0, 0]), (4, 1))
+    planner = GivesUp(mug_planner, [0, 1, 2, 9])
+    agent = Algorithm1(
+        mug_task,
+        planner,
+        lambda observation, lanes: (Subgoal(goal, observation.gripper, goal), None),
+        config=Algorithm1Config(tries=3),
+    )
+    agent.reset(range(4))
+    action = agent.act(0, [0, 1, 2, 3], mug_task.observe([0, 1, 2, 3]))
+    active, keys = zip(*planner.asked, strict=True)
+    np.testing.assert_array_equal(active, [[1, 1, 1, 1], [0, 1, 1, 1], [0, 0, 1, 1]])
+    assert len(np.unique(np.concatenate(keys), axis=0)) == 12
+    result = action.decision.motion.result
+    solved, over = Status.SOLVED, Status.BUDGET_EXHAUSTED
+    assert result.status.tolist() == [solved, solved, solved, over]
+    counted = np.sum(np.array(planner.found) * np.array(active), axis=0)
+    np.testing.assert_array_equal(result.expansions, counted)
+    for way in action.q:
+        np.testing.assert_allclose(way[-1], goal[0], atol=1e-3)
 
 
 def test_a_gripper_that_closed_on_nothing_opens_and_backs_off(mug_task, mug_planner):

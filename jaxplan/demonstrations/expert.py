@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from jaxplan.algorithm1 import Algorithm1
+from jaxplan.algorithm1 import Algorithm1, Algorithm1Config
 from jaxplan.base import Action, Keyframes, Observation, Subgoal
 from jaxplan.motion import MotionPlanner
 from jaxplan.ranges import Checked, NotNegative, Probability, Whole
@@ -65,7 +65,8 @@ class ExpertAgent:
         self._task, self._config = task, config
         self.planner = planner or task.expert_planner()
         self._scripts: list[_Script] = []
-        self._algorithm = Algorithm1(task, self.planner, self.predict)
+        once = Algorithm1Config(tries=1)
+        self._algorithm = Algorithm1(task, self.planner, self.predict, config=once)
 
     def reset(self, seeds: Sequence[int]) -> None:
         """Begins a batch, one episode a seed; a seed says whether its episode is noisy."""

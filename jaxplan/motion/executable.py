@@ -42,6 +42,27 @@ class Motion(NamedTuple):
     seconds: float
     """Wall time of the search of the whole batch [s], smoothing left out."""
 
+    def then(self, other: "Motion", lanes: np.ndarray) -> "Motion":
+        """The other's motions for some lanes `[P]` bool that were searched again; costs add up."""
+
+        def either(mine: np.ndarray, its: np.ndarray) -> np.ndarray:
+            return np.where(lanes.reshape(-1, *[1] * (mine.ndim - 1)), its, mine)
+
+        result = jax.tree.map(either, self.result, other.result)
+        costs = ("expansions", "accepted", "learned", "checks")
+        added = {
+            name: getattr(self.result, name)
+            + np.where(lanes, getattr(other.result, name), 0)
+            for name in costs
+        }
+        q = [
+            its if lane else mine
+            for mine, its, lane in zip(self.q, other.q, lanes, strict=True)
+        ]
+        rung = either(self.rung, other.rung)
+        seconds = self.seconds + other.seconds
+        return Motion(result._replace(**added), q, rung, seconds)
+
 
 class MotionPlanner:
     """Plans batches of motions in one scene, whose worlds differ from problem to problem.
