@@ -19,6 +19,7 @@ import numpy as np
 from tqdm import tqdm
 
 from jaxplan.cli import run_script
+from jaxplan.config import PAPER_PLANNER
 from jaxplan.data import TOGGLES
 from jaxplan.evaluation.expansions import Counts, normalised, solved_share
 from jaxplan.evaluation.methods import BACKBONES, METHODS, OURS, Backbone, planner
@@ -26,11 +27,17 @@ from jaxplan.evaluation.problems import RecordedProblems
 from jaxplan.evaluation.recorded_study import RecordedStudy, StudyArgs
 from jaxplan.evaluation.result import Result
 from jaxplan.evaluation.tables import Table
+from jaxplan.ranges import Count
 
 
 @dataclass(frozen=True)
 class Args(StudyArgs):
     """Counts expansions on recorded problems."""
+
+    backbones: tuple[str, ...] = tuple(backbone.name for backbone in BACKBONES)
+    """In which the rows are compared."""
+    max_expansions: Count = PAPER_PLANNER.max_expansions
+    """N_rrt. The paper takes what is large enough that success has saturated."""
 
 
 class Group(NamedTuple):
@@ -43,19 +50,23 @@ class Group(NamedTuple):
 def main(args: Args) -> None:
     """Searches, prints tables, writes JSON."""
     start = time.perf_counter()
+    chosen = [backbone for backbone in BACKBONES if backbone.name in args.backbones]
+    if len(chosen) < len(args.backbones):
+        known = ", ".join(backbone.name for backbone in BACKBONES)
+        raise ValueError(f"backbones {' '.join(args.backbones)}: there is {known}")
     study = RecordedStudy(args)
     problems = study.problems
     tables: list[Table] = []
     shortfalls: list[str] = []
-    bar = tqdm(total=len(BACKBONES) * len(METHODS), unit="search")
-    for backbone in BACKBONES:
+    bar = tqdm(total=len(chosen) * len(METHODS), unit="search")
+    for backbone in chosen:
         counts: dict[str, Counts] = {}
         rows = np.flatnonzero(problems.episode < (backbone.trials or math.inf))
         some = problems.take(rows)
         for method in METHODS:
             weights = method.weights and study.weights(method.weights)
             if method.weights is None or weights:
-                config = planner(backbone, method)
+                config = planner(backbone, method, max_expansions=args.max_expansions)
                 answers = study.answers(config, weights or None, rows)
                 counts[method.name] = Counts(
                     answers.expansions, answers.solved, some.episode
@@ -72,7 +83,8 @@ def main(args: Args) -> None:
         shortfalls += judge(backbone, args.variant, groups[1], counts)
     bar.close()
     seconds = time.perf_counter() - start
-    result = Result(tables, study.settings(), shortfalls, args.quick, seconds)
+    settings = study.settings() | {"max_expansions": args.max_expansions}
+    result = Result(tables, settings, shortfalls, args.quick, seconds)
     result.show()
     result.write(args.path("expansions"))
     print(f"written to {args.path('expansions')}")

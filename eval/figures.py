@@ -94,7 +94,7 @@ def main(args: Args) -> None:
     weights = load_pair(directory)
     config = ClosedLoopConfig(task=args.task, variant=args.variant, batch=len(seeds))
     loop = ClosedLoop(weights, config)
-    paint = Painter(loop.task, "near", scale=2)
+    paint = Painter(loop.task, "above" if loop.task.zones else "near", scale=2)
     recorder = Recorder(paint)
     result = loop.run(seeds, listen=recorder)
     solved = [e for e, row in enumerate(result["episodes"]) if row["success"]]
@@ -104,6 +104,7 @@ def main(args: Args) -> None:
     episodes = [recorder.scenes[e] for e in solved]
     end = paint.now(solved[0])
     names = [str(seeds[e]) for e in solved]
+    suffix = "" if args.variant == "plain" else f"_{args.variant}"
     for number in args.figures:
         if number == 2:
             page = figure2(paint, episodes[0])
@@ -115,7 +116,7 @@ def main(args: Args) -> None:
             page = figure5(paint, loop, directory, episodes[0])
         else:
             raise ValueError(f"figure {number}: 2, 3, 4 or 5")
-        path = args.out / f"figure{number}.png"
+        path = args.out / f"figure{number}{suffix}.png"
         small(page).save(path, optimize=True)
         print(f"written: {path} (seeds {', '.join(names[:3])})")
 

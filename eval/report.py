@@ -128,7 +128,9 @@ SECTIONS = (
         "Not in the paper. In the variant `ways` the mug is carried past a post on either side; an "
         "episode may close one of them by a zone that no camera sees. Demonstrations take the way "
         "that their seed leaves, so that a sampler should hold both. A problem's ways are found by "
-        "the demonstrations' planner, the others closed.",
+        "the demonstrations' planner, the others closed; a proposal belongs to the way whose "
+        "closing takes it away.\n\n![Proposals of diffusion, CVAE and conditional GAN on the way "
+        "past the post, from above](../figures/figure5_ways.png)",
         summary.ways,
     ),
     Section(
@@ -173,7 +175,7 @@ SECTIONS = (
         "--study.algorithm.regrasp --out eval/results/success_noisy_regrasp.json",
         "Not in the paper. No grasp fails with the shipped weights, so each joint of what the "
         "upper network says gets noise of 0.03 rad here: without recovery and with it.",
-        summary.recovery,
+        None,
     ),
     Section(
         "results/scene_sampler",
@@ -246,6 +248,7 @@ def report(results: Path = RESULTS, root: Path = ROOT) -> dict[str, str]:
     ]
     pages: dict[str, str] = {}
     earlier: list[str] = []
+    more: list[str] = []
     for section in SECTIONS:
         found = {
             name: json.loads(path.read_text(encoding="utf-8"))
@@ -253,16 +256,19 @@ def report(results: Path = RESULTS, root: Path = ROOT) -> dict[str, str]:
             if (path := results / f"{name}.json").is_file()
         }
         pages[f"docs/{section.page}.md"] = _page(section, found)
-        parts.append(f"## [{section.title}](docs/{section.page}.md)\n")
-        if not found:
-            parts.append(_missing(section))
-        elif section.summary is not None:
-            parts.append(markdown(section.summary(found)))
         earlier += [name for name in found if _is_earlier(name, found[name])]
-        if worse := _worse(found):
-            parts.append(_summed(worse))
+        head = f"[{section.title}](docs/{section.page}.md)"
+        worse = _summed(_worse(found)) if _worse(found) else ""
+        if section.summary is None:
+            said = worse if found else _missing(section)
+            more.append(f"- {head}. {said}".strip())
+            continue
+        parts.append(f"## {head}\n")
+        parts.append(markdown(section.summary(found)) if found else _missing(section))
+        parts += filter(None, [worse])
     if earlier:
         parts[1] += f"\nMeasured with {EARLIER}: {', '.join(earlier)}.\n"
+    parts += ["## More\n", "\n".join(more) + "\n"]
     pictures = [
         f"{caption}<br>![{caption.partition(':')[0]}](docs/figures/{name})\n"
         for name, caption in FIGURES.items()

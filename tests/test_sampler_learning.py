@@ -12,7 +12,7 @@ import pytest
 from toy_demonstrations import demonstrations
 
 from jaxplan import diffusion as maths
-from jaxplan import learning, pretrained, train
+from jaxplan import learning, pretrained, tasks, train
 from jaxplan.learning import loop, sampler
 from jaxplan.pretrained import shipped
 from jaxplan.samplers import FAMILIES, cvae, diffusion, few_step, gan, init
@@ -167,7 +167,8 @@ def test_weights_of_another_task_camera_or_robot_are_refused():
 
 
 def test_shipped_weights_say_what_they_are_for():
-    for variant, task in (("plain", "mug"), ("cluttered", "mug_cluttered")):
+    for variant in tasks.TASKS["mug"].variants:
+        task = tasks.check("mug", variant)
         for name in ("predictor", *FAMILIES):
             info = pretrained.load_weights(name, shipped(variant)).info
             assert (info["cameras"], info["robots"]) == (["hand"], ["panda"])

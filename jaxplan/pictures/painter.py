@@ -38,6 +38,13 @@ class Mark(NamedTuple):
     color: Color
 
 
+VIEWS = {
+    "near": ((0.42, -0.10, 0.23), 1.15, -28.0),
+    "above": ((0.45, -0.20, 0.15), 1.35, -72.0),
+}
+"""Where they look, from how far, and how steeply."""
+
+
 class Moment(NamedTuple):
     """An episode at the start of a phase, or after its last."""
 
@@ -56,14 +63,15 @@ class Painter:
 
     Args:
         task: Whose scene it is.
-        view: Where from: `static` shows the whole robot, `near` the hand at work.
+        view: Where from: `static` shows the whole robot, `near` the hand at work, `above` the ways
+            past what stands on the table.
         scale: Of the picture's sides, 1 for `WIDTH` by `HEIGHT`, at most 2.
     """
 
     def __init__(self, task: Tabletop, view: str = "static", scale: int = 1) -> None:
         model = copy.copy(task.model)
         model.vis.quality.shadowsize, model.vis.quality.offsamples = 2048, 2
-        self._view = _near() if view == "near" else view
+        self._view = _view(*VIEWS[view]) if view in VIEWS else view
         self._scale = scale
         self._camera = Camera(model, scale * HEIGHT, scale * WIDTH)
         self._task = task
@@ -190,9 +198,11 @@ def _window(places: np.ndarray, size: tuple[int, int]) -> tuple[int, int, int, i
     return int(left), int(top), int(right), int(bottom)
 
 
-def _near() -> mujoco.MjvCamera:
-    """A view of the table's middle, and the hand above it."""
+def _view(
+    lookat: tuple[float, float, float], distance: float, elevation: float
+) -> mujoco.MjvCamera:
+    """From the robot's left [m, degrees]."""
     view = mujoco.MjvCamera()
-    view.lookat[:] = 0.42, -0.10, 0.23
-    view.distance, view.azimuth, view.elevation = 1.15, 125.0, -28.0
+    view.lookat[:] = lookat
+    view.distance, view.azimuth, view.elevation = distance, 125.0, elevation
     return view
