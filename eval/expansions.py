@@ -13,7 +13,7 @@ whether the episode closes one.
 import math
 import time
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from tqdm import tqdm
@@ -36,6 +36,8 @@ class Args(StudyArgs):
 
     backbones: tuple[str, ...] = tuple(backbone.name for backbone in BACKBONES)
     """In which the rows are compared."""
+    methods: tuple[str, ...] = tuple(method.name for method in METHODS)
+    """Those rows."""
     max_expansions: Count = PAPER_PLANNER.max_expansions
     """N_rrt. The paper takes what is large enough that success has saturated."""
 
@@ -50,20 +52,18 @@ class Group(NamedTuple):
 def main(args: Args) -> None:
     """Searches, prints tables, writes JSON."""
     start = time.perf_counter()
-    chosen = [backbone for backbone in BACKBONES if backbone.name in args.backbones]
-    if len(chosen) < len(args.backbones):
-        known = ", ".join(backbone.name for backbone in BACKBONES)
-        raise ValueError(f"backbones {' '.join(args.backbones)}: there is {known}")
+    chosen = named("backbones", BACKBONES, args.backbones)
+    methods = named("methods", METHODS, args.methods)
     study = RecordedStudy(args)
     problems = study.problems
     tables: list[Table] = []
     shortfalls: list[str] = []
-    bar = tqdm(total=len(chosen) * len(METHODS), unit="search")
+    bar = tqdm(total=len(chosen) * len(methods), unit="search")
     for backbone in chosen:
         counts: dict[str, Counts] = {}
         rows = np.flatnonzero(problems.episode < (backbone.trials or math.inf))
         some = problems.take(rows)
-        for method in METHODS:
+        for method in methods:
             weights = method.weights and study.weights(method.weights)
             if method.weights is None or weights:
                 config = planner(backbone, method, max_expansions=args.max_expansions)
@@ -90,6 +90,18 @@ def main(args: Args) -> None:
     print(f"written to {args.path('expansions')}")
 
 
+def named(field: str, known: tuple[Any, ...], names: tuple[str, ...]) -> list[Any]:
+    """Those of some names, in their own order.
+
+    Raises:
+        ValueError: There is none of a name.
+    """
+    if unknown := {*names} - {each.name for each in known}:
+        there = ", ".join(each.name for each in known)
+        raise ValueError(f"{field} {', '.join(sorted(unknown))}: there is {there}")
+    return [each for each in known if each.name in names]
+
+
 def past_the_obstacle(problems: RecordedProblems, ways: int) -> list[Group]:
     """Phases that can be passed by several ways, with all of them open and with one closed."""
     if ways < 2:
@@ -109,7 +121,7 @@ def compare(backbone: Backbone, group: Group, counts: dict[str, Counts]) -> Tabl
     common = group.rows & np.all([counts[n].solved for n in half], axis=0)
     for method in METHODS:
         if method.name not in counts or own is None:
-            rows.append([method.name, "no weights", *[None] * 5, method.paper])
+            rows.append([method.name, "not measured", *[None] * 5, method.paper])
             continue
         count = counts[method.name]
         rows.append(

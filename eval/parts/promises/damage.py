@@ -235,8 +235,8 @@ def _with_checksums(node: Any, files: dict[str, Path]) -> Any:
     if not isinstance(node, dict):
         return node
     node = {
-        key: data.sha256(files[key])
-        if key in files and isinstance(value, str)
+        key: data.sha256(files[Path(key).name])
+        if Path(key).name in files and isinstance(value, str)
         else _with_checksums(value, files)
         for key, value in node.items()
     }

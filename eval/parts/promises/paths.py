@@ -20,7 +20,8 @@ from jaxplan.evaluation.random_scenes import random_scene, random_world
 from parts.promises.promise import Promise, Trial
 
 SLOTS = {"box": 4, "cylinder": 2, "sphere": 2}
-SIZES = {"box": 3, "cylinder": 2, "sphere": 1}
+SIZES = {"box": 3, "ellipsoid": 3, "cylinder": 2, "capsule": 2, "sphere": 1}
+"""Numbers of each kind."""
 ARMS = ("panda", "fetch", 2, 13)
 """Published ones as spheres, and scenes drawn by seed: two arms and meshes among them."""
 NEAR = 1e-4
