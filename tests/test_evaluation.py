@@ -26,6 +26,12 @@ def test_wilson_agrees_with_scipy(trials, data):
     assert wilson(successes, trials) == pytest.approx(expected, abs=1e-6)
 
 
+@pytest.mark.parametrize("trials", [1, 34, 126, 1000])
+def test_of_none_and_of_all_a_bound_is_exact(trials):
+    assert wilson(0, trials)[0] == 0
+    assert wilson(trials, trials)[1] == 1
+
+
 def test_an_interval_of_nothing_is_refused():
     with pytest.raises(ValueError, match="at least one"):
         wilson(0, 0)

@@ -19,7 +19,9 @@ def wilson(successes: int, trials: int, z: float = 1.959964) -> tuple[float, flo
     middle = rate + z * z / (2 * trials)
     spread = z * math.sqrt(rate * (1 - rate) / trials + z * z / (4 * trials * trials))
     scale = 1 + z * z / trials
-    return (middle - spread) / scale, (middle + spread) / scale
+    low, high = (middle - spread) / scale, (middle + spread) / scale
+    # Of none and of all a bound is exact, but for rounding.
+    return (low if successes else 0.0), (high if successes < trials else 1.0)
 
 
 def bootstrap(
