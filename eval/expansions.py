@@ -13,9 +13,10 @@ whether the episode closes one.
 import math
 import time
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
+from parts.named import named
 from tqdm import tqdm
 
 from jaxplan.cli import run_script
@@ -52,8 +53,8 @@ class Group(NamedTuple):
 def main(args: Args) -> None:
     """Searches, prints tables, writes JSON."""
     start = time.perf_counter()
-    chosen = named("backbones", BACKBONES, args.backbones)
-    methods = named("methods", METHODS, args.methods)
+    chosen = named("backbones", {each.name: each for each in BACKBONES}, args.backbones)
+    methods = named("methods", {each.name: each for each in METHODS}, args.methods)
     study = RecordedStudy(args)
     problems = study.problems
     tables: list[Table] = []
@@ -90,26 +91,14 @@ def main(args: Args) -> None:
     print(f"written to {args.path('expansions')}")
 
 
-def named(field: str, known: tuple[Any, ...], names: tuple[str, ...]) -> list[Any]:
-    """Those of some names, in their own order.
-
-    Raises:
-        ValueError: There is none of a name.
-    """
-    if unknown := {*names} - {each.name for each in known}:
-        there = ", ".join(each.name for each in known)
-        raise ValueError(f"{field} {', '.join(sorted(unknown))}: there is {there}")
-    return [each for each in known if each.name in names]
-
-
 def past_the_obstacle(problems: RecordedProblems, ways: int) -> list[Group]:
     """Phases that can be passed by several ways, with all of them open and with one closed."""
     if ways < 2:
         return []
-    last = problems.blocked & (problems.toggle == len(TOGGLES) - 1)
+    past, closed = problems.past_the_obstacle, problems.closed
     return [
-        Group("past the obstacle, all ways open", last & ~problems.closed),
-        Group("past the obstacle, a way closed", last & problems.closed),
+        Group("past the obstacle, all ways open", past & ~closed),
+        Group("past the obstacle, a way closed", past & closed),
     ]
 
 

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from parts.named import named
 from parts.promises import PROMISES, Promise
 from tqdm import tqdm
 
@@ -51,10 +52,8 @@ class Tried:
 def main(args: Args) -> None:
     """Tries, prints, writes."""
     start = time.perf_counter()
-    known = [promise.number for promise in PROMISES]
-    if unknown := {*args.only} - {*known}:
-        raise ValueError(f"only {', '.join(sorted(unknown))}: {', '.join(known)}")
-    chosen = [p for p in PROMISES if not args.only or p.number in args.only]
+    known = {promise.number: promise for promise in PROMISES}
+    chosen = named("only", known, args.only or known)
     memo, tried = Memo(), {}
     with TemporaryDirectory() as work:
         for promise in chosen:
@@ -65,7 +64,7 @@ def main(args: Args) -> None:
                 print(f"{promise.number}: {fault}")
     result = Result(
         [table(tried)],
-        {"machine_hours": (time.perf_counter() - start) / 3600},
+        {},
         [
             f"{promise.number}: {len(found.faults)} of {found.times}: {found.faults[0]}"
             for promise, found in tried.items()

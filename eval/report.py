@@ -39,11 +39,14 @@ class Section(NamedTuple):
     summary: Callable[[Found], Table] | None
 
 
+SUCCESS = ("success", "success_cluttered", "success_ways")
+"""Files of `eval/success.py`, in the paper's setting."""
+
 SECTIONS = (
     Section(
         "results/success",
         "Table 1, our row, and Table 5, nominal: success and toggle error",
-        ("success", "success_cluttered", "success_ways"),
+        SUCCESS,
         "python eval/success.py --seeds 200000:200300 --out eval/results/success.json",
         "MuJoCo in place of PyBullet, our own mug, grasps that hold by friction alone. The paper's "
         "toggle error is to the nearest toggle of the episode; the stricter one is to the toggle "
@@ -262,7 +265,8 @@ def report(results: Path = RESULTS, root: Path = ROOT) -> dict[str, str]:
         pages[f"docs/{section.page}.md"] = _page(section, found)
         earlier += [name for name in found if _is_earlier(name, found[name])]
         head = f"[{section.title}](docs/{section.page}.md)"
-        worse = _summed(_worse(found)) if _worse(found) else ""
+        lines = _worse(found)
+        worse = _summed(lines) if lines else ""
         if section.summary is None:
             said = worse if found else _missing(section)
             more.append(f"- {head}. {said}".strip())
@@ -414,7 +418,7 @@ def _worse(found: Found) -> list[str]:
     """Where ours is worse than the paper or short of its aim, a line each."""
     ours = [result for name, result in found.items() if name not in NOT_OURS]
     lines = [line for result in ours for line in result.get("shortfalls", [])]
-    for name in ("success", "success_cluttered", "success_ways"):
+    for name in SUCCESS:
         if result := found.get(name):
             success = 100 * result["success_rate"]
             if success < PAPER_SUCCESS:

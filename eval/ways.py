@@ -64,7 +64,7 @@ def main(args: Args) -> None:
     study = RecordedStudy(args)
     if len(study.task.zones) < 2:
         raise ValueError(f"variant {args.variant!r}: its problems have one way each")
-    rows = np.flatnonzero(study.problems.blocked & (study.problems.toggle == 3))
+    rows = np.flatnonzero(study.problems.past_the_obstacle)
     rows, ways = by_each_way(study, rows)
     problems = study.problems.take(rows)
     points = points_for(PAPER_PLANNER.step_max, PAPER_PLANNER.edge_resolution)

@@ -158,10 +158,10 @@ def missing_shards(
                 f"{directory} was made with settings {manifest['settings']}, "
                 f"not {wanted}: choose another directory"
             )
-    return [i for i in range(count) if not _intact(shard_path(directory, i), listed)]
+    return [i for i in range(count) if not _is_whole(shard_path(directory, i), listed)]
 
 
-def _intact(path: Path, listed: Mapping[str, str]) -> bool:
+def _is_whole(path: Path, listed: Mapping[str, str]) -> bool:
     if not path.is_file():
         return False
     if path.name in listed:

@@ -16,6 +16,7 @@ from jaxplan.collision import World
 from jaxplan.collision.obstacles import FAR
 from jaxplan.data import (
     MANIFEST,
+    TOGGLES,
     DataError,
     read_manifest,
     save_manifest,
@@ -76,6 +77,11 @@ class RecordedProblems(NamedTuple):
     def episode(self) -> np.ndarray:
         """i64 [P] which episode (trial) each problem belongs to, counted from 0."""
         return np.unique(self.seed, return_inverse=True)[1]
+
+    @property
+    def past_the_obstacle(self) -> np.ndarray:
+        """bool [P]: the way to the last toggle is blocked, where it may have several ways."""
+        return self.blocked & (self.toggle == len(TOGGLES) - 1)
 
     @property
     def closed(self) -> np.ndarray:

@@ -193,7 +193,9 @@ class Tabletop(ABC):
 
     def observe(self, lanes: Sequence[int]) -> Observation:
         """Renders the camera and reads joints and gripper mode."""
-        image, q, gripper = self._blank()
+        image = np.zeros((self.batch, *self.eyes.image, 3), np.uint8)
+        q = np.zeros((self.batch, self.robot.dof), np.float32)
+        gripper = np.zeros(self.batch, np.uint8)
         for e in lanes:
             image[e] = self.eyes.picture(e, self.sim.data[e])
             q[e], gripper[e] = self.sim.q(e), self.closed[e]
@@ -286,12 +288,6 @@ class Tabletop(ABC):
                 object may meet or leave what it stands on, and an open hand the object.
         """
         return stacked([self._world(e, bool(touching[e])) for e in range(self.batch)])
-
-    def _blank(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        lanes = self.batch
-        image = np.zeros((lanes, *self.eyes.image, 3), np.uint8)
-        q = np.zeros((lanes, self.robot.dof), np.float32)
-        return image, q, np.zeros(lanes, np.uint8)
 
     def _world(self, lane: int, touching: bool) -> tuple[np.ndarray, ...]:
         """The leaves of an episode's `World`."""

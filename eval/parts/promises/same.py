@@ -47,6 +47,12 @@ def _problem(number: int) -> tuple[np.ndarray, np.ndarray, jaxplan.World]:
     return *q, world
 
 
+def _plan(number: int, seed: int) -> jaxplan.Plan:
+    """The answer to a problem."""
+    start, goal, world = _problem(number)
+    return _planner().plan(start, goal, seed, world)
+
+
 def _answers(numbers: Sequence[int]) -> list[str]:
     """Digests of what problems come to, asked together."""
     problems = [_problem(number) for number in numbers]
@@ -115,10 +121,9 @@ def _processes(place: Path) -> Trial:
 def _compilations(place: Path) -> Trial:
     """Problems, worlds and seeds that change compile nothing, once each kind was there."""
     counted: list[str] = []
-    planner, seen, first = _planner(), set[Status](), 0
+    seen, first = set[Status](), 0
     while not seen >= KINDS:
-        start, goal, world = _problem(first)
-        seen.add(planner.plan(start, goal, first, world).status)
+        seen.add(_plan(first, first).status)
         first += 1
     jax.monitoring.register_event_duration_secs_listener(
         lambda event, *_, **__: (
@@ -131,8 +136,7 @@ def _compilations(place: Path) -> Trial:
     def trial(numbers: range) -> list[str]:
         before = len(counted)
         for number in numbers:
-            start, goal, world = _problem(first + number)
-            planner.plan(start, goal, number, world)
+            _plan(first + number, number)
         new = len(counted) - before
         return [f"{new} programs compiled in {len(numbers)} problems"] if new else []
 
@@ -148,12 +152,10 @@ def _resident() -> int:
 
 def _memory(place: Path) -> Trial:
     """By how much it grows, the first tenth of the problems left out."""
-    planner = _planner()
 
     def ask(numbers: range) -> None:
         for number in numbers:
-            start, goal, world = _problem(number)
-            planner.plan(start, goal, number, world)
+            _plan(number, number)
 
     def trial(numbers: range) -> list[str]:
         ask(range(len(numbers) // 10))
